@@ -17,7 +17,10 @@ void declare(Arguments& a) {
       "gradients: all of them against finite differences, in double precision; bits: the hashes that every "
       "processor has to give; machine: processor, disk, ports; udev: prints a rule that opens the ports of "
       "USB devices; file FILE [OTHER]: checksum, provenance, and "
-      "whether OTHER (recordings or a file) is what it was made from; training FILE --data DIR: repeats "
+      "whether OTHER (recordings or a file) is what it was made from; chain FILE OTHER: whether model and "
+      "recordings (--data) are those that the header OTHER of its C code states, and give that code and "
+      "picture; "
+      "training FILE --data DIR: repeats "
       "parts of a training that kept a ledger; step FILE --data DIR --at N: opens one step of it, with every "
       "operator; picture FILE --recording FILE --at S --out FILE: writes one picture with every array on the "
       "way to it; "
@@ -29,7 +32,8 @@ void declare(Arguments& a) {
            "gradients: plant errors in the reverse step of this op, or of 'all', one after the other: wrong "
            "sign, doubled, without a term, at the wrong index; each has to be found");
   a.flag("report", "bits: print the rows of docs/bits.md for this machine");
-  a.option("data", "DIR", "training, step, ledgers: the recordings that the model was trained on");
+  a.option("data", "DIR", "training, step, ledgers, chain: the recordings that the model was trained on");
+  a.option("picture", "HEX", "chain: what the self-test said on the device, 16 digits");
   a.option("segments", "K", "training: how many of its twenty parts are repeated", "1");
   a.option("seed", "N", "training: draws them", "0");
   a.option("at", "N",
@@ -75,8 +79,8 @@ void need(const Arguments& a, const std::string& name) {
 }  // namespace
 
 int run(Arguments& a) {
-  const std::string what = a.choice(
-      "WHAT", {"gradients", "bits", "machine", "udev", "file", "training", "step", "picture", "ledgers"});
+  const std::string what = a.choice("WHAT", {"gradients", "bits", "machine", "udev", "file", "chain",
+                                             "training", "step", "picture", "ledgers"});
   if (what == "gradients") return check_gradients(a);
   if (what == "bits") return check_bits(a);
   if (what == "machine") return check_machine(a);
@@ -87,7 +91,8 @@ int run(Arguments& a) {
     for (const char* name : {"recording", "at", "out"}) need(a, name);
     return check_picture(a);
   }
-  need(a, what == "ledgers" ? "OTHER" : "data");
+  need(a, what == "ledgers" || what == "chain" ? "OTHER" : "data");
+  if (what == "chain") return check_chain(a);
   if (what == "ledgers") return check_ledgers(a);
   if (what == "training") return check_training(a);
   need(a, "at");

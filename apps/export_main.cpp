@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/output_folder.h"
-#include "apps/common/output/provenance.h"
 #include "data/recordings/mcap_log.h"
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
-#include "models/files/c_code.h"
+#include "models/files/chain.h"
 #include "models/files/onnx.h"
 
 namespace supertac {
@@ -53,14 +51,10 @@ int export_onnx(Arguments& arguments, const ModelFile& file) {
   return kExitOk;
 }
 
-int export_c(Arguments& arguments, const ModelFile& file) {
-  const std::string model = arguments.text("FILE"), name = arguments.text("name");
+int export_c(Arguments& arguments, const SafetensorsFile& file) {
+  const std::string name = arguments.text("name");
   const double hz = arguments.given("sensor-hz") ? arguments.number("sensor-hz", 1, 100'000) : 0;
-  const CCode code = read_option("name", [&] {
-    return c_code_of(file, name, hz > 0 ? hz : file.input.rate_hz,
-                     "supertac-export of " + std::filesystem::path(model).filename().string() + " (SHA-256 " +
-                         hash_of_file(model).substr(0, 16) + ")");
-  });
+  const CCode code = read_option("name", [&] { return exported(file, name, hz); });
   OutputFolder folder(arguments.output("c99"));
   const std::string header = folder.add(name + ".h"), source = folder.add(name + ".c");
   write_file(header, code.header);
@@ -105,7 +99,7 @@ int export_mcap(Arguments& arguments, const SafetensorsFile& file) {
   if (!std::ranges::all_of(times, [](double t) { return std::isfinite(t); }))
     throw FileError(file.path(), "a time is not finite; stream it again");
   const double began_s = parse_double(value_or(file.metadata(), "began_s")).value_or(NAN);
-  McapLog log(arguments.output("mcap"), array, signal_scale_of(file).unit, image, !half_widths.empty());
+  McapLog log(arguments.output("mcap"), array, signal_scale_of(file), image, !half_widths.empty());
   const auto part = [](const std::vector<float>& of, std::size_t i, std::size_t size) {
     return of.empty() ? std::span<const float>{} : std::span(of).subspan(i * size, size);
   };
@@ -123,10 +117,9 @@ int export_mcap(Arguments& arguments, const SafetensorsFile& file) {
 }  // namespace
 
 int run(Arguments& arguments) {
-  const std::string path = arguments.text("FILE");
-  if (arguments.given("mcap")) return export_mcap(arguments, SafetensorsFile::read(path));
-  const ModelFile model = load_model(path);
-  return arguments.given("c99") ? export_c(arguments, model) : export_onnx(arguments, model);
+  const SafetensorsFile file = SafetensorsFile::read(arguments.text("FILE"));
+  if (arguments.given("mcap")) return export_mcap(arguments, file);
+  return arguments.given("c99") ? export_c(arguments, file) : export_onnx(arguments, model_of(file));
 }
 
 }  // namespace supertac

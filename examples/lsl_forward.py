@@ -9,7 +9,7 @@ array itself. Samples have the frames' own spacing; the first one is stamped whe
 import json
 import sys
 
-if sys.argv[1:]:
+if sys.argv[1:]:  # it takes none
     print(__doc__)
     sys.exit(0 if sys.argv[1] in ("-h", "--help") else 2)
 

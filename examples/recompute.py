@@ -13,7 +13,11 @@ import json
 import pathlib
 import sys
 
-import numpy as np
+if sys.argv[1:] in ([], ["-h"], ["--help"]):
+    print(__doc__)
+    sys.exit(0 if sys.argv[1:] else 2)
+
+import numpy as np  # noqa: E402
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
 from supertac.files import read  # noqa: E402

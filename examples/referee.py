@@ -372,6 +372,9 @@ def computed(ran, arrays):
 
 
 def main():
+    if sys.argv[1:] in ([], ["-h"], ["--help"]):
+        print(__doc__)
+        sys.exit(0 if sys.argv[1:] else 2)
     if len(sys.argv) != 2:
         sys.exit(__doc__)
     operators, arrays = read(sys.argv[1])

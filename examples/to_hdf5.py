@@ -9,8 +9,12 @@ position_mm [n,2] or pictures [n,height,width]; its metadata are the group's att
 import pathlib
 import sys
 
-import h5py
-import supertac
+if sys.argv[1:] in ([], ["-h"], ["--help"]):
+    print(__doc__)
+    sys.exit(0 if sys.argv[1:] else 2)
+
+import h5py  # noqa: E402
+import supertac  # noqa: E402
 
 
 def main(out, *files):

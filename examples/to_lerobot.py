@@ -3,15 +3,21 @@
 
     examples/to_lerobot.py OUT_DIR FPS FILE.safetensors ...
 
-Each file is an episode, its plate the task. Frames are those nearest to every 1/FPS s: observation.taxels [signals] in
-the unit of the file, and what all files have of observation.position_mm [2] and observation.picture [height,width].
+Each file is an episode, its plate the task, and a frame stands every 1/FPS s, as those of a camera do. Touch is faster:
+observation.taxels [K,signals], in the unit of the file, are the K newest frames at that time, oldest first, K as many as
+come in 1/FPS s; observation.position_mm [2] and observation.picture [height,width], of what all files have, are the
+newest.
 """
 import pathlib
 import sys
 
-import numpy as np
-import supertac
-from lerobot.datasets.lerobot_dataset import LeRobotDataset
+if sys.argv[1:] in ([], ["-h"], ["--help"]):
+    print(__doc__)
+    sys.exit(0 if sys.argv[1:] else 2)
+
+import numpy as np  # noqa: E402
+import supertac  # noqa: E402
+from lerobot.datasets.lerobot_dataset import LeRobotDataset  # noqa: E402
 
 NAMES = {"volts": "observation.taxels", "position_mm": "observation.position_mm", "pictures": "observation.picture"}
 
@@ -19,15 +25,19 @@ NAMES = {"volts": "observation.taxels", "position_mm": "observation.position_mm"
 def main(out, fps, *files):
     episodes = [supertac.read(path) for path in map(pathlib.Path, files)]
     common = [name for name in NAMES if all(name in tensors for tensors, _ in episodes)]
-    features = {NAMES[name]: {"dtype": "float32", "shape": episodes[0][0][name].shape[1:], "names": None} for name in common}
+    period_s = np.median(np.concatenate([np.diff(tensors["time_s"]) for tensors, _ in episodes]))
+    between = np.arange(1 - max(1, round(1 / float(fps) / period_s)), 1)  # frames of touch up to the newest
+    shapes = {name: episodes[0][0][name].shape[1:] for name in common}
+    shapes["volts"] = (len(between), *shapes["volts"])
+    features = {NAMES[name]: {"dtype": "float32", "shape": shapes[name], "names": None} for name in common}
     data = LeRobotDataset.create("local/tactile", int(fps), features, root=out, robot_type="supertac", use_videos=False)
     for tensors, metadata in episodes:
         times = tensors["time_s"]
-        wanted = np.arange(times[0], times[-1], 1 / int(fps))
-        after = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
-        nearest = after - (wanted - times[after - 1] < times[after] - wanted)
-        for i in nearest:
-            data.add_frame({NAMES[name]: np.ascontiguousarray(tensors[name][i], "f4") for name in common}
+        first = times[len(between) - 1]
+        newest = np.searchsorted(times, np.arange(first, times[-1], 1 / float(fps)) + 1e-6 * period_s, "right") - 1
+        for i in newest:
+            rows = {name: tensors[name][i + between if name == "volts" else i] for name in common}
+            data.add_frame({NAMES[name]: np.ascontiguousarray(row, "f4") for name, row in rows.items()}
                            | {"task": "feel " + metadata.get("plate", "a surface")})
         data.save_episode()
     data.finalize()

@@ -7,8 +7,12 @@
 import pathlib
 import sys
 
-import numpy as np
-import supertac
+if sys.argv[1:] in ([], ["-h"], ["--help"]):
+    print(__doc__)
+    sys.exit(0 if sys.argv[1:] else 2)
+
+import numpy as np  # noqa: E402
+import supertac  # noqa: E402
 
 data = pathlib.Path(sys.argv[1])
 recording = supertac.read_recording(sorted(data.glob("*.safetensors"))[0])

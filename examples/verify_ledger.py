@@ -10,12 +10,14 @@ import re
 import struct
 import sys
 
+if sys.argv[1:] in ([], ["-h"], ["--help"]):
+    print(__doc__)
+    sys.exit(0 if sys.argv[1:] else 2)
+
 try:
     import numpy as np
 except ImportError:
     sys.exit("verify_ledger.py: expected NumPy, found none; install it (Debian: apt-get install python3-numpy)")
-if len(sys.argv) != 2:
-    sys.exit(__doc__)
 
 
 def in_memory(name, array):

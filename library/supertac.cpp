@@ -8,7 +8,6 @@
 #include <cstring>
 #include <exception>
 #include <limits>
-#include <new>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -16,16 +15,23 @@
 #include "data/map/surface_map.h"
 #include "data/windows/live_window.h"
 #include "data/windows/transforms/normalise_window.h"
+#include "data/windows/windows.h"
 #include "io/numbers/numbers.h"
+#include "library/guard.h"
 #include "models/files/model_file.h"
 #include "models/inference/prepared/prepared.h"
 #include "models/training/train.h"
 
 using namespace supertac;
+using c::expect, c::expect_within, c::guarded;
 
 struct supertac_model {
   ModelFile file;
   Prepared prepared;
+};
+
+struct supertac_pairs {
+  WindowSet windows;
 };
 
 struct supertac_map {
@@ -52,40 +58,6 @@ thread_local bool alone = false;
   alone = true;
   omp_set_num_threads(1);
 });
-
-// Of an error that leaves no memory for its words the short ones remain, which take none.
-void keep(const char* text) noexcept {
-  try {
-    last_error = text;
-  } catch (...) {
-    last_error.assign("no memory");
-  }
-}
-
-// What `work` returns, or `failed` when it throws; supertac_error() then has the message.
-template <class Result, class Work>
-Result guarded(Result failed, Work work) noexcept {
-  try {
-    return work();
-  } catch (const std::bad_alloc&) {
-    keep("not enough memory");
-  } catch (const std::exception& error) {
-    keep(error.what());
-  } catch (...) {
-    keep("unknown error");
-  }
-  return failed;
-}
-
-void expect(bool holds, const char* what) {
-  if (!holds) throw std::invalid_argument(what);
-}
-
-void expect_within(const char* what, double found, double least, double most) {
-  if (found >= least && found <= most) return;
-  throw std::invalid_argument(std::string(what) + " must be " + format(least) + " to " + format(most) +
-                              ", got " + format(found));
-}
 
 supertac_model* opened(ModelFile file, int precision) {
   expect(precision == SUPERTAC_FP32 || precision == SUPERTAC_INT8,
@@ -114,6 +86,21 @@ void draw(const supertac_model& model, const Tensor& inputs, float* pictures, fl
 }
 
 }  // namespace
+
+// Of an error that leaves no memory for its words the short ones remain, which take none.
+void c::keep(const char* text) noexcept {
+  try {
+    last_error = text;
+  } catch (...) {
+    last_error.assign("no memory");
+  }
+}
+
+void c::expect_within(const char* what, double found, double least, double most) {
+  if (found >= least && found <= most) return;
+  throw std::invalid_argument(std::string(what) + " must be " + format(least) + " to " + format(most) +
+                              ", got " + format(found));
+}
 
 const char* supertac_version(void) { return SUPERTAC_VERSION; }
 
@@ -277,6 +264,39 @@ int supertac_map_cells(const supertac_map* map, int* height, int* width, double 
     if (errors != nullptr) std::fill_n(errors, cells.values.size(), std::numeric_limits<float>::quiet_NaN());
     map->model->file.interval_factors().half_widths(cells.values, cells.errors, cells.errors);
     if (errors != nullptr) std::ranges::copy(cells.errors, errors);
+    return 0;
+  });
+}
+
+supertac_pairs* supertac_pairs_open(const supertac_model* model, const char* recordings, long long stride) {
+  return guarded<supertac_pairs*>(nullptr, [&] {
+    expect(model != nullptr && recordings != nullptr, "supertac_pairs_open: a pointer is NULL");
+    expect_within("supertac_pairs_open: stride", static_cast<double>(stride), 1, 1e6);
+    WindowSettings settings = model->file.windows();
+    settings.stride = static_cast<int>(stride);
+    return new supertac_pairs{WindowSet::load(recordings, {}, settings)};
+  });
+}
+
+void supertac_pairs_close(supertac_pairs* pairs) { delete pairs; }
+
+std::size_t supertac_pairs_count(const supertac_pairs* pairs) {
+  return pairs == nullptr ? 0 : pairs->windows.size();
+}
+
+int supertac_pairs_read(const supertac_pairs* pairs, std::size_t first, std::size_t count, float* windows,
+                        float* truths) {
+  return guarded(-1, [&] {
+    expect(pairs != nullptr && windows != nullptr && truths != nullptr,
+           "supertac_pairs_read: a pointer is NULL");
+    const WindowSet& all = pairs->windows;
+    expect(first <= all.size() && count <= all.size() - first,
+           "supertac_pairs_read: there are not so many pairs");
+    const std::size_t pixels = all.image().pixels();
+    for (std::size_t i = 0; i < count; ++i) {
+      all.window(first + i, std::span(windows + i * all.input_size(), all.input_size()));
+      all.truth(first + i, std::span(truths + i * pixels, pixels));
+    }
     return 0;
   });
 }

@@ -87,6 +87,44 @@ SUPERTAC_API int supertac_live_push(supertac_live* live, double time_s, const fl
    there is none yet, or a gap was just before; -1: failed. */
 SUPERTAC_API int supertac_live_picture(supertac_live* live, float* picture, float* predicted_error);
 
+/* An array of your own, as its file describes it (docs/sensors.md): order, rest, gain, dead taxels and clock
+   are applied as in all programs. */
+typedef struct supertac_sensor supertac_sensor; /* used by one thread at a time */
+typedef struct {
+  size_t size;                    /* set it to sizeof(supertac_sensor_description) before the call */
+  const char *name, *unit, *port; /* of the file; valid until supertac_sensor_free() */
+  int rows, columns, channels, signals;
+  double pitch_mm[2], rate_hz; /* pitch along a row, and from row to row */
+  double rest, span;           /* (rest - signal) / span is 0 at rest and 1 at the end of the range */
+} supertac_sensor_description;
+typedef struct {
+  double time_s;      /* of the sensor's clock, increasing, from any zero */
+  double total_force; /* sum over the taxels of (rest - signal) / span; no unit of force */
+  size_t saturated;   /* signals at the end of their range, where more force changes nothing */
+} supertac_frame;
+enum { SUPERTAC_ENDED = 2 };
+
+/* Reads the file `path`; "rig" is the paper's. NULL on failure. */
+SUPERTAC_API supertac_sensor* supertac_sensor_new(const char* path);
+SUPERTAC_API void supertac_sensor_free(supertac_sensor* sensor);
+SUPERTAC_API int supertac_sensor_describe(const supertac_sensor* sensor,
+                                          supertac_sensor_description* description);
+
+/* What the sensor sends within `seconds`, 0.1 to 600, as supertac-stream --probe says it: JSON with "says", a
+   list of lines, and "draft", what its file should be, or null. `port`: NULL for the file's, or another, as
+   in a file. Valid until the next call. NULL on failure. */
+SUPERTAC_API const char* supertac_sensor_probe(supertac_sensor* sensor, const char* port, double seconds);
+
+/* Starts to read, by a thread of the library, which keeps the newest 4096 frames for you. 0, or -1. */
+SUPERTAC_API int supertac_sensor_start(supertac_sensor* sensor, const char* port);
+/* The next frame, oldest first, and its [signals] in the sensor's unit, row by row. 1: written; 0: none came
+   within wait_s; SUPERTAC_ENDED: a file or pipe is at its end; -1: failed. */
+SUPERTAC_API int supertac_sensor_next(supertac_sensor* sensor, double wait_s, supertac_frame* frame,
+                                      float* signals);
+/* Frames that did not arrive whole, and those that were not taken in time. 0, or -1. */
+SUPERTAC_API int supertac_sensor_lost(supertac_sensor* sensor, unsigned long long* missing,
+                                      unsigned long long* dropped);
+
 /* One map of the whole surface that was felt, made of the model's pictures and of where they were; the same
    bits as --map of the programs. `model` must outlive it. NULL on failure. */
 typedef struct supertac_map supertac_map; /* used by one thread at a time */
@@ -103,6 +141,19 @@ SUPERTAC_API int supertac_map_add(supertac_map* map, double x_mm, double y_mm, c
    none): NULL where only the size is wanted. 0, or -1. */
 SUPERTAC_API int supertac_map_cells(const supertac_map* map, int* height, int* width, double corner_mm[2],
                                     float* values, float* errors);
+
+/* Windows with their truths: all that the model could be trained on of a folder of recordings of its array
+   and unit; every stride-th frame of a recording ends one. NULL on failure, also where there is none. */
+typedef struct supertac_pairs supertac_pairs; /* never changes */
+SUPERTAC_API supertac_pairs* supertac_pairs_open(const supertac_model* model, const char* recordings,
+                                                 long long stride);
+SUPERTAC_API void supertac_pairs_close(supertac_pairs* pairs);
+SUPERTAC_API size_t supertac_pairs_count(const supertac_pairs* pairs);
+/* `count` of them from the first-th on. windows: [count][timesteps][signals] as the network takes them,
+   scaled and normalised, oldest frame first (supertac_draw takes those in the sensor's unit); truths:
+   [count][height][width], 0 is the flat plate and 1 its highest point, or as measured. 0, or -1. */
+SUPERTAC_API int supertac_pairs_read(const supertac_pairs* pairs, size_t first, size_t count, float* windows,
+                                     float* truths);
 
 /* Trains a network on a folder of recordings and writes the model, in the place of an older file `out`, as
    supertac-train does: the same settings make the same content. recipe: "paper", "best", "tiny" or "frame".

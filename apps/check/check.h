@@ -18,6 +18,10 @@ int check_bits(const Arguments& a);
 /// `supertac-check file`: checksum, content hash and provenance, and whether its data are those given.
 int check_file(const Arguments& a);
 
+/// `supertac-check chain`: the links from recordings to the picture of a microcontroller
+/// (models/files/chain.h), each made again and compared with what the exported header states.
+int check_chain(const Arguments& a);
+
 /// `supertac-check training`: repeats pieces of a training from its kept states and compares every line of
 /// its ledger, all arrays of the state and the batches.
 int check_training(const Arguments& a);

@@ -53,7 +53,7 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   else if (!settings.out.path.empty())
     log_ = std::make_unique<PictureLog>(settings.out, format);
   if (!settings.mcap.path.empty())
-    mcap_ = std::make_unique<McapLog>(settings.mcap, source.array(), source.signal_scale().unit, format.image,
+    mcap_ = std::make_unique<McapLog>(settings.mcap, source.array(), source.signal_scale(), format.image,
                                       format.half_widths);
   if (maker_ && (settings.web || !settings.map.path.empty()))
     map_.emplace(maker_->image(), models.front().model->settings().timesteps > 1);
@@ -267,7 +267,8 @@ void Stream::output(const Seen& seen) {
   if (log_) log_->add(seen);
   if (mcap_) mcap_->add(seen.time_s, seen.wall_s, seen.volts, seen.picture, seen.half_widths);
   if (!udp_ && !pipe_) return;
-  std::string line = picture_line(seen, state_.unlike_training, about_lines_);
+  const FrameLoad load = load_of(seen.volts, source_.array().channels, source_.signal_scale());
+  std::string line = picture_line(seen, load, state_.unlike_training, about_lines_);
   if (udp_) udp_->send(line);
   if (pipe_) pipe_->send(std::move(line));
 }

@@ -1,6 +1,7 @@
 #include "data/recordings/mcap_log.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace supertac {
@@ -118,15 +119,21 @@ std::vector<McapChannel> channels_of(const TaxelArray& array, const std::string&
   const std::string heights = "1: the plate's highest point";
   std::vector<McapChannel> channels = {channel("taxels", false, unit),
                                        channel("picture", true, drawn ? heights : unit)};
+  const std::string loads = "1: a taxel at the end of its range";
+  channels.push_back({"/supertac/total_force", "std_msgs/msg/Float32", "float32 data\n", {{"unit", loads}}});
+  channels.push_back({"/supertac/saturated", "std_msgs/msg/UInt32", "uint32 data\n", {{"unit", "signals"}}});
   if (half_widths) channels.push_back(channel("half_width", true, heights));
   return channels;
 }
 
 }  // namespace
 
-McapLog::McapLog(const OutputPath& output, const TaxelArray& array, const std::string& unit,
+McapLog::McapLog(const OutputPath& output, const TaxelArray& array, const SignalScale& scale,
                  const ImageGrid& image, bool half_widths)
-    : array_(array), image_(image), file_(output, channels_of(array, unit, image, half_widths)) {}
+    : array_(array),
+      scale_(scale),
+      image_(image),
+      file_(output, channels_of(array, scale.unit, image, half_widths)) {}
 
 void McapLog::add(double time_s, double wall_s, std::span<const float> signals,
                   std::span<const float> picture, std::span<const float> half_widths) {
@@ -137,8 +144,12 @@ void McapLog::add(double time_s, double wall_s, std::span<const float> signals,
             image_.pixels() > 0
                 ? image_message(logged, image_.height, image_.width, 1, picture)
                 : image_message(logged, array_.rows, array_.columns, array_.channels, signals));
+  const FrameLoad load = load_of(signals, array_.channels, scale_);
+  file_.add(2, logged, published,
+            Cdr().number(std::bit_cast<std::uint32_t>(static_cast<float>(load.total_force))).message());
+  file_.add(3, logged, published, Cdr().number(load.saturated).message());
   if (!half_widths.empty())
-    file_.add(2, logged, published, image_message(logged, image_.height, image_.width, 1, half_widths));
+    file_.add(4, logged, published, image_message(logged, image_.height, image_.width, 1, half_widths));
 }
 
 }  // namespace supertac

@@ -11,8 +11,8 @@
 #include "c99_text.h"
 #include "data/windows/live_window.h"
 #include "data/windows/transforms/normalise_window.h"
-#include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/sha256.h"
 #include "io/numbers/text.h"
 #include "models/inference/prepared/integer_plan.h"
 
@@ -172,8 +172,8 @@ Dim self_test_frames(const ModelFile& file, double sensor_hz) {
   return static_cast<Dim>(std::ceil(w.timesteps / w.rate_hz * sensor_hz)) + 3;
 }
 
-// What NAME_self_test() of window.c returns where all bits are right.
-std::uint64_t self_test_hash(const ModelFile& file, double sensor_hz) {
+// What NAME_self_test() of window.c returns where all bits are right, in 16 digits.
+std::string self_test_hash(const ModelFile& file, double sensor_hz) {
   const WindowSettings w = file.windows();
   const double period = 1 / sensor_hz;
   LiveWindow live({.timesteps = w.timesteps,
@@ -195,15 +195,10 @@ std::uint64_t self_test_hash(const ModelFile& file, double sensor_hz) {
   Tensor window(file.model->input_shape(1));
   live.window(window.values());
   const Estimate drawn = prepared(file, Precision::int8).estimate(window);
-  std::uint64_t hash = 14695981039346656037ULL;
-  const auto add = [&](std::span<const real> values) {
-    for (const real value : values)
-      for (int k = 0; k < 32; k += 8)
-        hash = (hash ^ (std::bit_cast<std::uint32_t>(value) >> k & 255U)) * 1099511628211ULL;
-  };
-  add(drawn.picture.values());
-  if (file.model->settings().predicted_error) add(drawn.predicted_error.values());
-  return hash;
+  Sha256 hash;
+  hash.add(std::as_bytes(drawn.picture.values()));
+  if (file.model->settings().predicted_error) hash.add(std::as_bytes(drawn.predicted_error.values()));
+  return hash.hex().substr(0, 16);
 }
 
 // Behind the name of the model: every name of the file that is no other's business, so that several models
@@ -258,8 +253,8 @@ std::string window_constants(const ModelFile& file, double sensor_hz) {
          define("REST_SHARE", text(kRestShare)) + define("TOP_RANK", text(kTopRank));
 }
 
-std::string header_of(const ModelFile& file, const IntegerPlan& plan, std::size_t weights,
-                      std::uint64_t self_test, const std::string& top) {
+std::string header_of(const ModelFile& file, const IntegerPlan& plan, std::size_t weights, double sensor_hz,
+                      const std::string& self_test, const std::string& top) {
   const NetworkFormat f = file.model->format();
   const std::string pixels = "UPPER_HEIGHT * UPPER_WIDTH";
   return top +
@@ -271,6 +266,7 @@ std::string header_of(const ModelFile& file, const IntegerPlan& plan, std::size_
          define("UPPER_TIMESTEPS", text(f.frames), "samples of a window") +
          define("UPPER_HEIGHT", text(f.rows * f.scale), "of the picture, in pixels") +
          define("UPPER_WIDTH", text(f.columns * f.scale)) +
+         define("UPPER_SENSOR_HZ", number(sensor_hz), "frames a second that it is made for") +
          define("UPPER_WORK_BYTES", text(plan.work_area),
                 "of RAM for the network; its window takes 4 bytes a value") +
          define("UPPER_WEIGHT_BYTES", std::to_string(weights), "of flash") + R"(
@@ -292,11 +288,11 @@ void NAME_draw(const float window[UPPER_TIMESTEPS * UPPER_SIGNALS], float pictur
 /* Forgets all frames. */
 void NAME_reset(void);
 
-/* Draws one window of frames that the code itself makes, and forgets all frames. Returns the hash of the picture and its
-   predicted error (FNV-1a of 64 bits): UPPER_SELF_TEST where compiler and processor draw the bits of a PC, else
-   another number, or 0. Both rooms are needed. */
+/* Draws one window of frames that the code itself makes, and forgets all frames. Returns the first
+   64 bits of the SHA-256 of the picture and its predicted error, floats with their lowest byte first: UPPER_SELF_TEST
+   where compiler and processor draw the bits of a PC, else another number, or 0. Both rooms are needed. */
 #define UPPER_SELF_TEST )" +
-         "0x" + hex_digits(self_test, 16) + R"(ull
+         "0x" + self_test + R"(ull
 uint64_t NAME_self_test(float picture[)" +
          pixels + "], float predicted_error[" + pixels + R"(]);
 
@@ -317,21 +313,16 @@ void check(const ModelFile& file, const std::string& name, double sensor_hz) {
                                 in_quotes(name));
   if (!(sensor_hz >= 1 && sensor_hz <= 100'000))
     throw std::invalid_argument("C code: the sensor's rate must be 1 to 100000 Hz, got " + format(sensor_hz));
-  if (!file.ranges)
-    throw std::runtime_error(
-        "the model was saved without the ranges of its values, which C code in int8 needs; train it anew "
-        "with "
-        "this version");
 }
 
 }  // namespace
 
 CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz,
-                const std::string& written_by) {
+                std::vector<ChainLink> chain) {
   check(file, name, sensor_hz);
-  const auto plan = IntegerPlan::of(*file.model, *file.ranges);
+  const auto plan = IntegerPlan::of(*file.model, file.int8_ranges());
   Writer writer(*plan);
-  const std::string top = "/* " + name + ": tactile super-resolution, written by " + written_by + ". */\n";
+  const std::string top = "/* " + name + ": tactile super-resolution, written by supertac-export";
   const std::string products = writer.products();
   const std::string body =
       define("SIGNALS", "UPPER_SIGNALS") + define("TIMESTEPS", "UPPER_TIMESTEPS") +
@@ -343,17 +334,22 @@ CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz
       define("WORK", "work.bytes") + "\n" + kKernels + "\n/* ---- The network. ---- */\n\n" + writer.maps() +
       "\n" + products + writer.draw() + kWindow;
   const Privacy names = privacy_of(body);
-  const std::string source = top + "#include \"NAME.h\"\n\n#include <string.h>\n\n" + kBegin + names.before +
-                             "\n" + body + "\n" + names.after + kEnd;
   std::string upper = name;
   std::ranges::transform(upper, upper.begin(), [](unsigned char c) { return std::toupper(c); });
   const auto named = [&](const std::string& in) {
-    return replaced(replaced(in, "NAME_", name + "_"), "UPPER_", upper + "_");
+    return replaced(replaced(replaced(in, "NAME.h", name + ".h"), "NAME_", name + "_"), "UPPER_",
+                    upper + "_");
   };
-  return {named(replaced(header_of(file, *plan, writer.weights(), self_test_hash(file, sensor_hz), top),
-                         "NAME.h", name + ".h")),
-          named(replaced(source, "NAME.h", name + ".h")), writer.weights(),
-          static_cast<std::size_t>(plan->work_area)};
+  CCode code{{}, {}, std::move(chain), writer.weights(), static_cast<std::size_t>(plan->work_area)};
+  code.source = named(top + ". */\n#include \"NAME.h\"\n\n#include <string.h>\n\n" + kBegin + names.before +
+                      "\n" + body + "\n" + names.after + kEnd);
+  code.chain.push_back({"code", sha256(code.source)});
+  std::string made_of = top + ", of what these SHA-256 name (supertac-check chain):\n";
+  for (const ChainLink& link : code.chain) made_of += "   " + left_aligned(link.name, 11) + link.hash + "\n";
+  code.chain.push_back({"picture", self_test_hash(file, sensor_hz)});
+  code.header =
+      named(header_of(file, *plan, writer.weights(), sensor_hz, code.chain.back().hash, made_of + "*/\n"));
+  return code;
 }
 
 }  // namespace supertac

@@ -129,6 +129,13 @@ IntervalFactors ModelFile::interval_factors() const {
   return IntervalFactors::read(value_or(metadata, "interval_factor")).value_or(IntervalFactors{});
 }
 
+const ActivationRanges& ModelFile::int8_ranges() const {
+  if (ranges) return *ranges;
+  throw std::runtime_error(
+      "the model was saved without the ranges of its values, which int8 needs; train it anew with this "
+      "version, or take precision fp32");
+}
+
 TaxelArray ModelFile::array() const {
   const SuperTacSettings& s = model->settings();
   return {static_cast<int>(s.rows), static_cast<int>(s.columns), input.pitch_mm,
@@ -208,10 +215,7 @@ std::string name_of(Precision precision) { return precision == Precision::int8 ?
 
 Prepared prepared(const ModelFile& file, Precision precision) {
   if (precision == Precision::fp32) return Prepared(*file.model);
-  if (file.ranges) return Prepared(*file.model, *file.ranges);
-  throw std::runtime_error(
-      "the model was saved without the ranges of its values, which precision int8 "
-      "needs; train it anew with this version, or take precision fp32");
+  return Prepared(*file.model, file.int8_ranges());
 }
 
 Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision) {

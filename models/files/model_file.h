@@ -40,11 +40,13 @@ struct ModelFile {
   std::unique_ptr<SuperTac> model;
   InputSettings input;
   std::optional<Novelty> novelty;  ///< of its training windows; empty for single frames and in older files
-  std::optional<ActivationRanges> ranges;  ///< what int8 needs; empty in older files
+  std::optional<ActivationRanges> ranges;  ///< empty in older files
   std::map<std::string, std::string> metadata;
 
   /// What its predicted errors mean: the entry interval_factor, where there is one.
   IntervalFactors interval_factors() const;
+  /// What int8 needs. Throws std::runtime_error where the file has none.
+  const ActivationRanges& int8_ranges() const;
   /// The sensor it was trained on.
   TaxelArray array() const;
   /// The windows it takes: its array and length, picture size, rate and scaling.

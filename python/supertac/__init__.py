@@ -8,20 +8,24 @@
 """
 from __future__ import annotations
 
-import os
-
-from .files import read, write
+from .files import Path, read, write
 from .library import VERSION as __version__
 from .library import LiveWindow, SurfaceMap, train
 from .model import Model, Pictures, load_model, save_model
 from .recordings import Log, Recording, read_pictures, read_recording, windows, write_recording
+from .sensor import Frame, Frames, Probe, Sensor
 
-__all__ = ["__version__", "LiveWindow", "Log", "Model", "Pictures", "Recording", "SurfaceMap", "load", "load_model",
-           "read", "read_pictures", "read_recording", "save_model", "train", "windows", "write", "write_recording"]
+__all__ = ["__version__", "Frame", "Frames", "LiveWindow", "Log", "Model", "Pictures", "Probe", "Recording",
+           "Sensor", "SurfaceMap", "load", "load_model", "read", "read_pictures", "read_recording", "save_model",
+           "train", "windows", "write", "write_recording"]
 
 
-def load(path: str | os.PathLike) -> Model | Recording | Log:
-    """What a file of our programs holds: a model, a recording, or pictures of supertac-stream --out. Raises ValueError
-    naming the file and what is wrong."""
+def load(path: Path) -> Model | Recording | Log | Sensor:
+    """What a file of our programs holds: a model, a recording, pictures of supertac-stream --out, or a sensor (.json).
+    Raises ValueError naming the file and what is wrong."""
+    if str(path).endswith(".json"):
+        return Sensor(path)
     kind = read(path)[1].get("kind", "")
-    return {"recording": read_recording, "pictures": read_pictures}.get(kind, load_model)(path)
+    if kind == "recording":
+        return read_recording(path)
+    return read_pictures(path) if kind == "pictures" else load_model(path)

@@ -8,22 +8,27 @@ import os
 import pathlib
 import struct
 import zlib
+from typing import Any, Union
 
 import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+Path = Union[str, "os.PathLike[str]"]
 
 TYPES = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "I32": "<i4", "U8": "u1"}
 LARGEST_HEADER, MOST_TENSORS, MOST_FIELDS, HIGHEST_RANK = 1 << 20, 8192, 4096, 8
 
 
-def parse_json(path: str | os.PathLike, text: str | bytes):
+def parse_json(path: Path, text: str | bytes) -> Any:
     """JSON without keys that appear twice and without NaN. Raises ValueError naming the file."""
 
-    def unique(pairs):
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         if len(dict(pairs)) != len(pairs):
             raise ValueError("a key appears twice")
         return dict(pairs)
 
-    def refuse(constant):
+    def refuse(constant: str) -> None:
         raise ValueError(f"{constant} is no JSON")
 
     try:
@@ -32,7 +37,7 @@ def parse_json(path: str | os.PathLike, text: str | bytes):
         raise ValueError(f"{path}: its JSON cannot be read: {problem}") from None
 
 
-def _whole(path, raw, metadata):
+def _whole(path: Path, raw: bytes, metadata: dict[str, str]) -> None:
     """Raises ValueError unless header and data have the checksum that the metadata name; other writers name none."""
     found = metadata.get("checksum")
     if found is None:
@@ -42,7 +47,7 @@ def _whole(path, raw, metadata):
         raise ValueError(f"{path}: the checksum is not {found}: the file is damaged; copy it again")
 
 
-def _entry(entry):
+def _entry(entry: Any) -> tuple[str, list[int], int, int] | None:
     """Type, shape and offsets of a tensor's entry in the header; None where it is not as expected."""
     if not isinstance(entry, dict) or set(entry) != {"dtype", "shape", "data_offsets"}:
         return None
@@ -54,7 +59,7 @@ def _entry(entry):
     return (TYPES[kind], shape, *offsets) if offsets[1] - offsets[0] == size else None
 
 
-def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+def read(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
     """Tensors by name and metadata of a safetensors file. Raises ValueError naming the file and what is wrong."""
     raw = pathlib.Path(path).read_bytes()
     size = struct.unpack("<Q", raw[:8])[0] if len(raw) >= 8 else len(raw)
@@ -68,10 +73,12 @@ def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]
         raise ValueError(f"{path}: has {len(header)} tensors and {len(metadata)} fields, expected at most "
                          f"{MOST_TENSORS} and {MOST_FIELDS}")
     _whole(path, raw, metadata)
-    entries = {name: _entry(entry) for name, entry in header.items()}
-    bad = [name for name, entry in entries.items() if entry is None]
-    if bad:
-        raise ValueError(f"{path}: tensor {bad[0]!r} has a type, a shape or offsets that cannot be")
+    entries = {}
+    for name, given in header.items():
+        entry = _entry(given)
+        if entry is None:
+            raise ValueError(f"{path}: tensor {name!r} has a type, a shape or offsets that cannot be")
+        entries[name] = entry
     tensors, at = {}, 0
     for name, (kind, shape, begin, end) in sorted(entries.items(), key=lambda item: item[1][2:]):
         if begin != at or end > len(raw) - 8 - size:
@@ -84,11 +91,11 @@ def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]
     return {name: tensors[name] for name in header}, metadata
 
 
-def expect(path: str | os.PathLike, tensors: dict[str, np.ndarray], shapes: dict[str, list]) -> list:
+def expect(path: Path, tensors: dict[str, Array], shapes: dict[str, list[Any]]) -> list[Any]:
     """The named tensors, None for those that are not there. `shapes`: name to sizes, where None is any size and a text
     the same size wherever it stands; a name that ends in "?" need not be there. Raises ValueError."""
     sizes: dict[str, int] = {}
-    found: list = []
+    found: list[Any] = []
     for key, shape in shapes.items():
         name = key.rstrip("?")
         if name not in tensors:
@@ -105,13 +112,13 @@ def expect(path: str | os.PathLike, tensors: dict[str, np.ndarray], shapes: dict
     return found
 
 
-def write(path: str | os.PathLike, tensors: dict[str, np.ndarray], metadata: dict[str, str] | None = None,
+def write(path: Path, tensors: dict[str, Array], metadata: dict[str, str] | None = None,
           checksum: bool = False) -> None:
     """Writes arrays by name, the file complete or not at all; without our checksum, as a program of another maker would,
     or with it."""
     if checksum:
         metadata = {"checksum": "0" * 8, **(metadata or {}), "supertac_format": "1"}
-    header: dict = {} if metadata is None else {"__metadata__": metadata}
+    header: dict[str, Any] = {} if metadata is None else {"__metadata__": metadata}
     at = 0
     names = {np.dtype(text): name for name, text in TYPES.items()}
     for name, array in tensors.items():

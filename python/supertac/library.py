@@ -11,8 +11,14 @@ import functools
 import os
 import pathlib
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from .files import Array, Path
+
+if TYPE_CHECKING:
+    from .model import Model
 
 VERSION = "0.2.0"  # of the package and of the library that it takes
 PRECISIONS = {"fp32": 0, "int8": 1}
@@ -31,6 +37,17 @@ SIGNATURES = {  # result, arguments
     "supertac_map_free": (None, [POINTER]),
     "supertac_map_add": (ctypes.c_int, [POINTER, ctypes.c_double, ctypes.c_double, POINTER, POINTER]),
     "supertac_map_cells": (ctypes.c_int, [POINTER] * 6),
+    "supertac_sensor_new": (POINTER, [ctypes.c_char_p]),
+    "supertac_sensor_free": (None, [POINTER]),
+    "supertac_sensor_describe": (ctypes.c_int, [POINTER, POINTER]),
+    "supertac_sensor_probe": (ctypes.c_char_p, [POINTER, ctypes.c_char_p, ctypes.c_double]),
+    "supertac_sensor_start": (ctypes.c_int, [POINTER, ctypes.c_char_p]),
+    "supertac_sensor_next": (ctypes.c_int, [POINTER, ctypes.c_double, POINTER, POINTER]),
+    "supertac_sensor_lost": (ctypes.c_int, [POINTER, POINTER, POINTER]),
+    "supertac_pairs_open": (POINTER, [POINTER, ctypes.c_char_p, ctypes.c_longlong]),
+    "supertac_pairs_close": (None, [POINTER]),
+    "supertac_pairs_count": (SIZE, [POINTER]),
+    "supertac_pairs_read": (ctypes.c_int, [POINTER, SIZE, SIZE, POINTER, POINTER]),
     "supertac_train": (ctypes.c_int, [ctypes.c_char_p] * 3 + [POINTER, PROGRESS, POINTER]),
 }
 
@@ -56,14 +73,14 @@ def library() -> ctypes.CDLL:
     return loaded
 
 
-def checked(result, failed=-1):
+def checked(result: Any, failed: Any = -1) -> Any:
     """The result of a call. Raises ValueError with the library's own words when it failed."""
     if result == failed:
         raise ValueError(library().supertac_error().decode())
     return result
 
 
-def checked_windows(values, window: tuple[int, int]) -> np.ndarray:
+def checked_windows(values: Any, window: tuple[int, int]) -> Array:
     """float32 [N,T,S]. Raises ValueError for another shape."""
     windows = np.ascontiguousarray(values, np.float32)
     if windows.shape[1:] != window:
@@ -74,7 +91,7 @@ def checked_windows(values, window: tuple[int, int]) -> np.ndarray:
 class Drawer:
     """A model file's network, as the programs run it: windows [N,T,S] in the sensor's unit to pictures."""
 
-    def __init__(self, path: str | os.PathLike, settings: dict, precision: str = "fp32", threads: int = 1):
+    def __init__(self, path: Path, settings: dict[str, Any], precision: str = "fp32", threads: int = 1):
         if precision not in PRECISIONS:
             raise ValueError(f"precision {precision!r}: expected one of {', '.join(PRECISIONS)}")
         content, self.library = pathlib.Path(path).read_bytes(), library()
@@ -84,11 +101,11 @@ class Drawer:
         self.picture = array[0] * settings["scale"], array[1] * settings["scale"]
         self.predicts_error, self.threads = bool(settings.get("spread")), threads
 
-    def __del__(self):
+    def __del__(self) -> None:
         if getattr(self, "model", None) is not None:
             self.library.supertac_close(self.model)
 
-    def draw(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    def draw(self, values: Array) -> tuple[Array, Array | None]:
         """Pictures and predicted errors [N,height,width]; these are None for a model without."""
         windows = checked_windows(values, self.window)
         maps = np.empty((2 if self.predicts_error else 1, len(windows), *self.picture), np.float32)
@@ -96,6 +113,18 @@ class Drawer:
         errors_at = at + maps.nbytes // 2 if self.predicts_error else None
         checked(self.library.supertac_draw(self.model, len(windows), windows.ctypes.data, at, errors_at, self.threads))
         return maps[0], maps[1] if self.predicts_error else None
+
+
+def pairs(drawer: Drawer, folder: Path, stride: int) -> tuple[Array, Array]:
+    """Of Model.pairs()."""
+    opened = checked(drawer.library.supertac_pairs_open(drawer.model, os.fsencode(folder), stride), None)
+    try:
+        count = drawer.library.supertac_pairs_count(opened)
+        windows, truths = (np.empty((count, *shape), np.float32) for shape in (drawer.window, drawer.picture))
+        checked(drawer.library.supertac_pairs_read(opened, 0, count, windows.ctypes.data, truths.ctypes.data))
+    finally:
+        drawer.library.supertac_pairs_close(opened)
+    return windows, truths
 
 
 class LiveWindow:
@@ -106,18 +135,18 @@ class LiveWindow:
         picture = live.push(time_s, frame)
     """
 
-    def __init__(self, model, frame_hz: float, filter_s: float = 0.0, precision: str = "fp32"):
+    def __init__(self, model: Model, frame_hz: float, filter_s: float = 0.0, precision: str = "fp32"):
         """filter_s: moving average that the frames have gone through already."""
         self.drawer = model.drawer(precision)
         self.live = checked(library().supertac_live_new(self.drawer.model, frame_hz, filter_s), None)
         self._predicted_error = np.zeros(self.drawer.picture, np.float32)
         self._error_at = self._predicted_error.ctypes.data if self.drawer.predicts_error else None  # costs a microsecond
 
-    def __del__(self):
+    def __del__(self) -> None:
         if getattr(self, "live", None) is not None:
             self.drawer.library.supertac_live_free(self.live)
 
-    def push(self, time_s: float, frame: np.ndarray) -> np.ndarray | None:
+    def push(self, time_s: float, frame: Array) -> Array | None:
         """The picture [height,width] that ends with this frame, or None; predicted_error is then its own."""
         values = np.ascontiguousarray(frame, np.float32)
         if values.size != self.drawer.window[1]:
@@ -128,7 +157,7 @@ class LiveWindow:
         return picture if drawn else None
 
     @property
-    def predicted_error(self) -> np.ndarray:
+    def predicted_error(self) -> Array:
         """[height,width], of the last picture; the next one is written over it."""
         return self._predicted_error
 
@@ -138,15 +167,15 @@ class SurfaceMap:
     cells() gives values and errors [height,width], NaN where nothing was felt, and (x, y) of the first cell's corner in mm.
     """
 
-    def __init__(self, model):
+    def __init__(self, model: Model):
         self.drawer = model.drawer()
         self.map = checked(library().supertac_map_new(self.drawer.model), None)
 
-    def __del__(self):
+    def __del__(self) -> None:
         if getattr(self, "map", None) is not None:
             self.drawer.library.supertac_map_free(self.map)
 
-    def add(self, x_mm: float, y_mm: float, picture: np.ndarray, predicted_error: np.ndarray | None = None) -> None:
+    def add(self, x_mm: float, y_mm: float, picture: Array, predicted_error: Array | None = None) -> None:
         maps = [None if m is None else np.ascontiguousarray(m, np.float32) for m in (picture, predicted_error)]
         for one in maps:
             if one is not None and one.shape != self.drawer.picture:
@@ -154,7 +183,7 @@ class SurfaceMap:
         at = [None if one is None else one.ctypes.data for one in maps]
         checked(self.drawer.library.supertac_map_add(self.map, x_mm, y_mm, *at))
 
-    def cells(self) -> tuple[np.ndarray, np.ndarray, tuple[float, float]]:
+    def cells(self) -> tuple[Array, Array, tuple[float, float]]:
         height, width, corner = ctypes.c_int(), ctypes.c_int(), (ctypes.c_double * 2)()
         size = [ctypes.addressof(one) for one in (height, width, corner)]
         checked(self.drawer.library.supertac_map_cells(self.map, *size, None, None))
@@ -163,7 +192,7 @@ class SurfaceMap:
         return cells[0], cells[1], tuple(corner)
 
 
-def train(recipe: str, folder: str | os.PathLike, out: str | os.PathLike,
+def train(recipe: str, folder: Path, out: Path,
           callback: Callable[[int, float], object] | None = None, *, epochs: int = 0, stride: int = 0, seed: int = 0,
           split: str | None = None) -> bool:
     """Trains as supertac-train does, to the same content, on a folder of recordings, and replaces `out`. recipe:
@@ -172,9 +201,9 @@ def train(recipe: str, folder: str | os.PathLike, out: str | os.PathLike,
     callback(step, loss) is called after every step; when it returns something true, training ends early, and False is
     returned and nothing written. epochs and stride: 0 for the recipe's. split: what is kept for testing, "trial" or
     "none", ... Raises ValueError, and whatever the callback raises, KeyboardInterrupt too."""
-    raised = []
+    raised: list[BaseException] = []
 
-    def progress(_, step, loss):
+    def progress(_: object, step: int, loss: float) -> int:
         try:
             return 1 if callback is not None and callback(step, loss) else 0
         except BaseException as problem:  # noqa: BLE001: it goes on behind the library
@@ -186,4 +215,4 @@ def train(recipe: str, folder: str | os.PathLike, out: str | os.PathLike,
                                     PROGRESS(progress), None)
     if raised:
         raise raised[0]
-    return checked(done) == 1
+    return bool(checked(done) == 1)

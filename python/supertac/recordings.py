@@ -3,11 +3,12 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
-from .files import expect, parse_json, read, write
+from .files import Array, Path, expect, parse_json, read, write
 
 RIG = {"rows": 4, "columns": 4, "pitch_mm": 3, "channels": 1}
 RIG_SIGNALS = {"unit": "V", "pressed": "lower"}  # of a recording that does not say
@@ -18,16 +19,16 @@ SLACK = 1e-6  # of a period: time stamps are rounded
 class Recording:
     """One pass of the finger; n frames of S signals."""
 
-    time_s: np.ndarray  # [n], increasing
-    volts: np.ndarray  # [n,S], in the sensor's unit
-    position_mm: np.ndarray | None = None  # [n,2], x and y of the finger's centre; NaN where unknown
-    array: dict = dataclasses.field(default_factory=lambda: dict(RIG))  # taxel k: row k // columns, column k % columns
+    time_s: Array  # [n], increasing
+    volts: Array  # [n,S], in the sensor's unit
+    position_mm: Array | None = None  # [n,2], x and y of the finger's centre; NaN where unknown
+    array: dict[str, Any] = dataclasses.field(default_factory=lambda: dict(RIG))  # taxel k: row k // columns, column k % columns
     metadata: dict[str, str] = dataclasses.field(default_factory=dict)  # plate, trial, pass, signals, ...
-    lift_mm: np.ndarray | None = None  # [n], of the finger above its slide
-    truth: np.ndarray | None = None  # [n,H,W] in 0 to 1, what a finer sensor saw
+    lift_mm: Array | None = None  # [n], of the finger above its slide
+    truth: Array | None = None  # [n,H,W] in 0 to 1, what a finer sensor saw
 
     @property
-    def signals(self) -> dict:
+    def signals(self) -> dict[str, Any]:
         """Unit, polarity and range of the sensor."""
         return RIG_SIGNALS | (json.loads(self.metadata["signals"]) if "signals" in self.metadata else {})
 
@@ -46,19 +47,19 @@ class Recording:
 class Log:
     """What supertac-stream --out wrote: n pictures with the frames they were drawn at."""
 
-    time_s: np.ndarray  # [n]
-    volts: np.ndarray  # [n,S]
-    pictures: np.ndarray  # [n,height,width]
-    half_widths: np.ndarray | None  # the same: of the pixels' 90 % intervals
-    distances: np.ndarray | None  # [n], from what the model was trained on
-    metadata: dict
+    time_s: Array  # [n]
+    volts: Array  # [n,S]
+    pictures: Array  # [n,height,width]
+    half_widths: Array | None  # the same: of the pixels' 90 % intervals
+    distances: Array | None  # [n], from what the model was trained on
+    metadata: dict[str, str]
 
 
-SHAPES: dict[str, list] = {"time_s": ["n"], "volts": ["n", None], "position_mm?": ["n", 2], "lift_mm?": ["n"],
+SHAPES: dict[str, list[Any]] = {"time_s": ["n"], "volts": ["n", None], "position_mm?": ["n", 2], "lift_mm?": ["n"],
                            "truth?": ["n", None, None]}
 
 
-def _check(path, recording: Recording) -> None:
+def _check(path: Path, recording: Recording) -> None:
     array, times, volts = recording.array, recording.time_s, recording.volts
     pitch = array.get("pitch_mm") if isinstance(array, dict) else None  # or [along a row, from row to row]
     numbers = [*pitch] if isinstance(pitch, list) and len(pitch) == 2 else [pitch]
@@ -71,7 +72,7 @@ def _check(path, recording: Recording) -> None:
         raise ValueError(f"{path}: its times do not increase; record or import it again")
 
 
-def read_recording(path: str | os.PathLike) -> Recording:
+def read_recording(path: Path) -> Recording:
     """A recording of any of our programs. Raises ValueError naming the file and what is wrong."""
     tensors, metadata = read(path)
     if metadata.get("kind") != "recording":
@@ -83,11 +84,11 @@ def read_recording(path: str | os.PathLike) -> Recording:
     return recording
 
 
-def write_recording(path: str | os.PathLike, recording: Recording) -> None:
+def write_recording(path: Path, recording: Recording) -> None:
     """A file that our programs train on. Of the metadata, plate ("unknown"), trial and pass (1), speed_mm_s (0) and
     source ("python") have defaults; "signals" states unit, polarity and range of another sensor than the rig, as in
     {"unit": "counts", "pressed": "higher", "range": [40, 900]} (JSON). Raises ValueError for what they would refuse."""
-    tensors = {"time_s": np.asarray(recording.time_s, "<f8")}
+    tensors: dict[str, Any] = {"time_s": np.asarray(recording.time_s, "<f8")}
     tensors |= {name: np.asarray(value, "<f4") for name in ("volts", "position_mm", "lift_mm", "truth")
                 if (value := getattr(recording, name)) is not None}
     expect(path, tensors, SHAPES)
@@ -105,24 +106,26 @@ def write_recording(path: str | os.PathLike, recording: Recording) -> None:
     write(path, tensors, fields | {"kind": "recording"}, checksum=True)
 
 
-def read_pictures(path: str | os.PathLike) -> Log:
+def read_pictures(path: Path) -> Log:
     """What supertac-stream --out wrote. Raises ValueError naming the file and what is wrong."""
     tensors, metadata = read(path)
     if "pictures" not in tensors:
         raise ValueError(f"{path}: expected the pictures of supertac-stream --out, found {sorted(tensors)}")
     picture = ["n", "height", "width"]
-    return Log(*expect(path, tensors, {"time_s": ["n"], "volts": ["n", None], "pictures": picture,
-                                       "half_widths?": picture, "distances?": ["n"]}), metadata)
+    times, volts, pictures, half_widths, distances = expect(
+        path, tensors, {"time_s": ["n"], "volts": ["n", None], "pictures": picture, "half_widths?": picture,
+                        "distances?": ["n"]})
+    return Log(times, volts, pictures, half_widths, distances, metadata)
 
 
-def _runs(times, max_gap_s):
+def _runs(times: Array, max_gap_s: float) -> Iterable[tuple[int, int]]:
     """Pairs (begin, end) of frames between which no silence is longer."""
     cuts = np.flatnonzero(np.diff(times) > max_gap_s) + 1
     return zip([0, *cuts], [*cuts, len(times)])
 
 
 def windows(recording: Recording, timesteps: int, rate_hz: float,
-            max_gap_s: float = 0.05) -> tuple[np.ndarray, np.ndarray]:
+            max_gap_s: float = 0.05) -> tuple[Array, Array]:
     """Times [N] and windows [N,timesteps,S] in volts, one for each frame that has a whole window behind it: what
     supertac-stream draws. Sample j of a run without a gap is the mean of the frames around the run's first time plus
     j / rate_hz, as far as they have come; one without frames repeats the one before (data/recordings/resample.h)."""

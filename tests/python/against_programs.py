@@ -76,14 +76,31 @@ def live_pictures(model, recording):
     return np.array([picture for picture in drawn if picture is not None])
 
 
+def pairs_are_those_of_programs(name, model, data, folder):
+    """Of slides: windows and truths of supertac-evaluate, and what is refused."""
+    if not LIBRARY.exists():
+        return True
+    outputs = folder / "pairs.outputs.safetensors"
+    run("supertac-evaluate", "--model", model.path, "--data", data, "--split", "none", "--outputs", outputs,
+        "--quiet", "--force")
+    expected, (windows, truths) = supertac.read(outputs)[0], model.pairs(data)
+    try:
+        model.pairs(folder / "missing")
+        return False
+    except ValueError as error:
+        assert "missing" in str(error)
+    return (same_bits(f"{name}, windows of pairs", windows, expected["input"])
+            and same_bits(f"{name}, truths of pairs", truths, expected["truth"]))
+
+
 def comes_back(name, model, data, folder):
     """Five steps of training in PyTorch, saved: supertac-evaluate draws what the module draws."""
     module, path, outputs = model.to_torch(), folder / "tuned.safetensors", folder / "tuned.outputs.safetensors"
-    volts = torch.tensor(model.windows(supertac.read_recording(sorted(data.glob("*.safetensors"))[0]))[1][:64])
+    windows, truths = (torch.tensor(part[:64]) for part in model.pairs(data, 24))
     adam = torch.optim.Adam(module.parameters(), 1e-3)
     for _ in range(5):
         adam.zero_grad()
-        (module(volts).picture ** 2).mean().backward()
+        ((module.draw(windows).picture - truths) ** 2).mean().backward()
         adam.step()
     supertac.save_model(path, module, model)
     run("supertac-evaluate", "--model", path, "--data", data, "--split", "none", "--limit", 64, "--outputs", outputs,
@@ -214,34 +231,6 @@ def clients(model, recording):
     return works_in_a_fork(model, np.concatenate([volts, volts]))
 
 
-PYLSL = """import sys, time
-class StreamInfo:
-    def __init__(self, *words): pass
-    def desc(self): return self
-    def append_child_value(self, name, value): pass
-class StreamOutlet:
-    def __init__(self, info): pass
-    def push_sample(self, values, timestamp): print(len(values), timestamp)
-local_clock = time.monotonic
-"""
-
-
-def forwards(folder, path, recording):
-    """examples/lsl_forward.py with a stand-in for pylsl: the frames' own spacing, with a model and without."""
-    (folder / "pylsl.py").write_text(PYLSL)
-    for words, size in ((["--model", path], 256), ([], 16)):
-        lines = subprocess.run([pathlib.Path(sys.argv[1]) / "supertac-stream", "--recording", recording, *words, "--out", "-",
-                                "--quiet", "--seconds", "4"], capture_output=True, check=True).stdout
-        pushed = subprocess.run([sys.executable, ROOT / "examples/lsl_forward.py"], input=lines, capture_output=True, check=True,
-                                env=os.environ | {"PYTHONPATH": str(folder)}).stdout
-        samples = np.array([line.split() for line in pushed.splitlines()], float)
-        times = [json.loads(line)["timestamp"] for line in lines.splitlines()]
-        if (samples[:, 0] != size).any() or not np.allclose(np.diff(samples[:, 1]), np.diff(times), atol=1e-6):
-            print(f"lsl_forward.py {words}: {samples[:3]}")
-            return False
-    return True
-
-
 def refuses_damage(path):
     raw = bytearray(path.read_bytes())
     raw[-5] ^= 1
@@ -267,11 +256,8 @@ def main():
                 good &= compare(folder, data, preset, data / recordings[0].name)
         recording = supertac.read_recording(recordings[0])
         good &= clients(supertac.load(folder / "tiny4x4.safetensors"), recording)
-        good &= forwards(folder, folder / "tiny4x4.safetensors", recordings[0])
+        good &= pairs_are_those_of_programs("tiny", supertac.load(folder / "tiny4x4.safetensors"), rig, folder)
         good &= trains(folder, recording) and refuses_what_programs_refuse(folder, recording)
-        if LIBRARY.exists():
-            subprocess.run([sys.executable, ROOT / "examples/tour.py", rig], check=True,
-                           env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
         good &= refuses_damage(recordings[0])
     sys.exit(0 if good else 1)
 

@@ -29,7 +29,8 @@ except ImportError as missing:
 import supertac  # noqa: E402
 
 TOPICS = {"/supertac/taxels": "std_msgs/msg/Float32MultiArray", "/supertac/picture": "sensor_msgs/msg/Image",
-          "/supertac/half_width": "sensor_msgs/msg/Image"}
+          "/supertac/half_width": "sensor_msgs/msg/Image", "/supertac/total_force": "std_msgs/msg/Float32",
+          "/supertac/saturated": "std_msgs/msg/UInt32"}
 SENSOR = """{"name": "mat", "rows": 2, "columns": 3, "pitch_mm": 5, "channels": 1, "unit": "counts", "pressed": "higher",
 "range": [40, 900], "rate_hz": 100, "port": "udp::%d", "frame": {"kind": "text", "separator": ","}}"""
 
@@ -65,6 +66,10 @@ def values(image):
 def check_pictures(path, log, array, pixel_mm, began_s):
     found = contents(path)
     assert sorted(found) == sorted(TOPICS), sorted(found)
+    share = (2.45 - log.volts) / np.float64(0.36)  # of the rig's range
+    for topic, expected in (("total_force", share.sum(axis=1)), ("saturated", (np.abs(share) >= 1).sum(axis=1))):
+        found_there = np.array([message.data for message in found["/supertac/" + topic][3]])
+        assert np.abs(found_there - expected).max() < 1e-5, topic
     for topic, kept in zip(TOPICS, (log.volts, log.pictures, log.half_widths)):
         channel, logged, published, messages = found[topic]
         assert np.abs(published - log.time_s).max() < 1e-6 and np.abs(logged - published - began_s).max() < 1e-6
@@ -85,7 +90,7 @@ def check_rerun(path):
     """Its own checker: indexes, schemas, order of times."""
     if rerun := shutil.which("rerun", path=f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"):
         said = subprocess.run([rerun, "mcap", "check", path], capture_output=True, text=True)
-        assert said.returncode == 0 and said.stdout.count("ok ") == 3, said.stdout + said.stderr
+        assert said.returncode == 0 and said.stdout.count("ok ") == 5, said.stdout + said.stderr
         print(f"{path.name}: nothing for Rerun to complain of")
 
 
@@ -115,12 +120,13 @@ def check_lerobot(folder, log, seen):
     convert("to_lerobot.py", folder / "episodes", 50, log, log)
     data = LeRobotDataset("local/tactile", root=folder / "episodes")
     assert data.num_episodes == 2 and data.fps == 50 and len(data) % 2 == 0
-    times, middle = seen.time_s - seen.time_s[0], len(data) // 2
+    touches = round(1 / 50 / np.median(np.diff(seen.time_s)))
+    times, middle = seen.time_s, len(data) // 2
     for i in (0, 7, middle - 1, middle, len(data) - 1):
         frame = data[i]
-        nearest = np.abs(times - frame["frame_index"].item() / 50).argmin()
-        assert np.array_equal(frame["observation.taxels"], seen.volts[nearest])
-        assert np.array_equal(frame["observation.picture"], seen.pictures[nearest])
+        newest = np.flatnonzero(times <= times[touches - 1] + frame["frame_index"].item() / 50 + 1e-9)[-1]
+        assert np.array_equal(frame["observation.taxels"], seen.volts[newest + 1 - touches:newest + 1])
+        assert np.array_equal(frame["observation.picture"], seen.pictures[newest])
     print(f"episodes: {len(data)} frames, the same bits")
 
 

@@ -8,14 +8,17 @@
 #include <thread>
 
 #include "apps/stream/seen.h"
+#include "data/sensors/frame_load.h"
 
 namespace supertac {
 
-/// {"timestamp":s,"wall_s":s,"number":n,ABOUT,"volts":[...],"picture":[...]} with the numbers of Seen, four
-/// decimals of volts and pictures, and a line feed; without a model no "picture"; of one that says how sure
-/// it is also "half_width", the mean over the pixels, "distance" and "unlike_training", 0 or 1. "wall_s" only
-/// where it is known. PlotJuggler (JSON over UDP, field "timestamp" as time) makes a curve of every number.
-std::string picture_line(const Seen& seen, bool unlike_training, const std::string& about);
+/// {"timestamp":s,"wall_s":s,"number":n,ABOUT,"total_force":f,"saturated":n,"volts":[...],"picture":[...]}
+/// with the numbers of Seen and its load, four decimals of what is felt and drawn, and a line feed; without a
+/// model no "picture"; of one that says how sure it is also "half_width", the mean over the pixels,
+/// "distance" and "unlike_training", 0 or 1. "wall_s" only where it is known. PlotJuggler (JSON over UDP,
+/// field "timestamp" as time) makes a curve of every number.
+std::string picture_line(const Seen& seen, const FrameLoad& load, bool unlike_training,
+                         const std::string& about);
 /// What all lines of a stream have in common:
 /// "height":16,"width":16,"pixel_mm":0.75,"rows":4,"columns":4,"channels":1,"pitch_mm":3,"unit":"V".
 std::string about_lines(const TaxelArray& array, const std::string& unit, const ImageGrid& image);

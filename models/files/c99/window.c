@@ -151,19 +151,62 @@ int NAME_picture(float picture[PIXELS], float predicted_error[PIXELS]) {
   return 1;
 }
 
-/* FNV-1a over the bits, lowest byte first. */
-static uint64_t hash_of(uint64_t hash, const float *values, int32_t count) {
-  int32_t i, k;
+/* SHA-256 of words that come with their lowest byte first. */
+static const uint32_t rounds[64] = {
+    0x428a2f98u, 0x71374491u, 0xb5c0fbcfu, 0xe9b5dba5u, 0x3956c25bu, 0x59f111f1u, 0x923f82a4u, 0xab1c5ed5u,
+    0xd807aa98u, 0x12835b01u, 0x243185beu, 0x550c7dc3u, 0x72be5d74u, 0x80deb1feu, 0x9bdc06a7u, 0xc19bf174u,
+    0xe49b69c1u, 0xefbe4786u, 0x0fc19dc6u, 0x240ca1ccu, 0x2de92c6fu, 0x4a7484aau, 0x5cb0a9dcu, 0x76f988dau,
+    0x983e5152u, 0xa831c66du, 0xb00327c8u, 0xbf597fc7u, 0xc6e00bf3u, 0xd5a79147u, 0x06ca6351u, 0x14292967u,
+    0x27b70a85u, 0x2e1b2138u, 0x4d2c6dfcu, 0x53380d13u, 0x650a7354u, 0x766a0abbu, 0x81c2c92eu, 0x92722c85u,
+    0xa2bfe8a1u, 0xa81a664bu, 0xc24b8b70u, 0xc76c51a3u, 0xd192e819u, 0xd6990624u, 0xf40e3585u, 0x106aa070u,
+    0x19a4c116u, 0x1e376c08u, 0x2748774cu, 0x34b0bcb5u, 0x391c0cb3u, 0x4ed8aa4au, 0x5b9cca4fu, 0x682e6ff3u,
+    0x748f82eeu, 0x78a5636fu, 0x84c87814u, 0x8cc70208u, 0x90befffau, 0xa4506cebu, 0xbef9a3f7u, 0xc67178f2u,
+};
+struct sha256 {
+  uint32_t sums[8], block[16], words;
+};
+static uint32_t turned(uint32_t x, int32_t n) { return x >> n | x << (32 - n); }
+static void add_word(struct sha256 *hash, uint32_t word) {
+  uint32_t s[8], *w = hash->block, one, two, i, k;
+  w[hash->words++ % 16] = word << 24 | (word & 0xff00u) << 8 | (word >> 8 & 0xff00u) | word >> 24;
+  if (hash->words % 16 != 0) return;
+  memcpy(s, hash->sums, sizeof s);
+  for (i = 0; i < 64; ++i) {
+    if (i >= 16) {
+      one = w[(i + 1) % 16], two = w[(i + 14) % 16];
+      w[i % 16] += (turned(one, 7) ^ turned(one, 18) ^ one >> 3) + w[(i + 9) % 16] +
+                   (turned(two, 17) ^ turned(two, 19) ^ two >> 10);
+    }
+    one = s[7] + (turned(s[4], 6) ^ turned(s[4], 11) ^ turned(s[4], 25)) + ((s[4] & s[5]) ^ (~s[4] & s[6])) +
+          rounds[i] + w[i % 16];
+    two = (turned(s[0], 2) ^ turned(s[0], 13) ^ turned(s[0], 22)) + ((s[0] & s[1]) ^ (s[0] & s[2]) ^ (s[1] & s[2]));
+    for (k = 7; k > 0; --k) s[k] = s[k - 1];
+    s[4] += one, s[0] = one + two;
+  }
+  for (i = 0; i < 8; ++i) hash->sums[i] += s[i];
+}
+
+static void add_values(struct sha256 *hash, const float *values, int32_t count) {
+  int32_t i;
   for (i = 0; i < count; ++i) {
     uint32_t bits;
     memcpy(&bits, values + i, sizeof bits);
-    for (k = 0; k < 4; ++k, bits >>= 8) hash = (hash ^ (bits & 255)) * 1099511628211ull;
+    add_word(hash, bits);
   }
-  return hash;
+}
+
+/* The first 64 bits. */
+static uint64_t hash_of(struct sha256 *hash) {
+  const uint32_t bits = hash->words * 32;
+  add_word(hash, 0x80);
+  while (hash->words % 16 != 15) add_word(hash, 0);
+  add_word(hash, bits << 24 | (bits & 0xff00u) << 8 | (bits >> 8 & 0xff00u) | bits >> 24);
+  return (uint64_t)hash->sums[0] << 32 | hash->sums[1];
 }
 
 uint64_t NAME_self_test(float picture[PIXELS], float predicted_error[PIXELS]) {
-  uint64_t hash = 14695981039346656037ull;
+  struct sha256 hash = {{0x6a09e667u, 0xbb67ae85u, 0x3c6ef372u, 0xa54ff53au,
+                         0x510e527fu, 0x9b05688cu, 0x1f83d9abu, 0x5be0cd19u}, {0}, 0};
   uint32_t random = 1;
   int32_t i, k;
   float values[SIGNALS];
@@ -181,6 +224,7 @@ uint64_t NAME_self_test(float picture[PIXELS], float predicted_error[PIXELS]) {
   }
   if (!NAME_picture(picture, predicted_error)) return 0;
   NAME_reset();
-  hash = hash_of(hash, picture, PIXELS);
-  return PREDICTS_ERROR ? hash_of(hash, predicted_error, PIXELS) : hash;
+  add_values(&hash, picture, PIXELS);
+  if (PREDICTS_ERROR) add_values(&hash, predicted_error, PIXELS);
+  return hash_of(&hash);
 }

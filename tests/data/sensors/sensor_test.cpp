@@ -1,4 +1,5 @@
 #include "data/sensors/sensor.h"
+#include "data/sensors/frame_load.h"
 
 #include <gtest/gtest.h>
 
@@ -230,6 +231,18 @@ TEST(Sensor, MutatedFilesAreTakenOrRefusedInOneLine) {
   }
   EXPECT_GT(taken, 0U);
   EXPECT_LT(taken, static_cast<std::size_t>(count) / 2);
+}
+
+TEST(FrameLoad, AddsSharesOfTheRangeAndCountsItsEnds) {
+  const SignalScale counts{"counts", 40, -860};  // 40 at rest, 900 pressed hard
+  const std::vector<float> frame{40, 470, 900, 950, 40, 0};
+  const FrameLoad load = load_of(frame, 1, counts);
+  EXPECT_NEAR(load.total_force, 0.5 + 1 + 910.0 / 860 - 40.0 / 860, 1e-12);
+  EXPECT_EQ(load.saturated, 2U);
+  const SignalScale newtons{"N", 0, -2};  // of three axes
+  const FrameLoad of_three = load_of(std::vector<float>{0, 0.6F, 0.8F, -2, 0, 0}, 3, newtons);
+  EXPECT_NEAR(of_three.total_force, 0.5 + 1, 1e-7);
+  EXPECT_EQ(of_three.saturated, 1U);
 }
 
 }  // namespace

@@ -93,7 +93,7 @@ TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
           "cc -O1 -fsanitize=undefined -fno-sanitize-recover"}) {
       if (!has_compiler(std::string(flags).substr(0, std::string(flags).find(' ')))) continue;
       const ModelFile file = model_of(settings, {});
-      const CCode exported = c_code_of(file, "finger", 100, "a test");
+      const CCode exported = c_code_of(file, "finger", 100);
       const Compiled code(exported, flags);
       const auto draw = code.function<void(const float*, float*, float*)>("finger_draw");
       const Tensor windows = uniform(file.model->input_shape(5), 7);
@@ -127,7 +127,7 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
       settings.last_frame_path = timesteps == 1;
       const ModelFile file =
           model_of(settings, {.rate_hz = 50, .scaling = {.per_window = per_window}, .filter_s = filter_s});
-      const CCode exported = c_code_of(file, "finger", sensor_hz, "a test");
+      const CCode exported = c_code_of(file, "finger", sensor_hz);
       const Compiled code(exported, "cc -O3 -march=native");
       const auto push = code.function<int(double, const float*)>("finger_push_at");
       const auto draw = code.function<int(float*, float*)>("finger_picture");
@@ -171,7 +171,7 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
 // it runs.
 TEST(CCode, RefusesACompilerThatRearrangesSums) {
   if (!has_compiler()) GTEST_SKIP() << "no C compiler";
-  const CCode exported = c_code_of(model_of(tiny(), {}), "finger", 100, "a test");
+  const CCode exported = c_code_of(model_of(tiny(), {}), "finger", 100);
   for (const std::string words :
        {"cc -O2 -ffast-math", "cc -Ofast", "cc -O2 -ffinite-math-only", "clang -O1 -ffast-math"}) {
     if (!has_compiler(words.substr(0, words.find(' ')))) continue;
@@ -190,8 +190,8 @@ TEST(CCode, SeveralModelsFitIntoOneUnit) {
   if (!has_compiler()) GTEST_SKIP() << "no C compiler";
   SuperTacSettings other = tiny();
   other.rows = 3, other.scale = 2, other.timesteps = 32;
-  const CCode finger = c_code_of(model_of(tiny(), {}), "finger", 100, "a test"),
-              palm = c_code_of(model_of(other, {.scaling = {}, .filter_s = 0.02}), "palm", 300, "a test");
+  const CCode finger = c_code_of(model_of(tiny(), {}), "finger", 100),
+              palm = c_code_of(model_of(other, {.scaling = {}, .filter_s = 0.02}), "palm", 300);
   const std::map<std::string, std::string> more = {
       {"palm.h", palm.header},
       {"palm.c", palm.source},
@@ -211,23 +211,23 @@ TEST(CCode, SeveralModelsFitIntoOneUnit) {
 
 TEST(CCode, RefusesWhatIsNoNameOrRateOrHasNoRanges) {
   ModelFile file = model_of(tiny(), {});
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { c_code_of(file, "1st", 100, ""); }),
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { c_code_of(file, "1st", 100); }),
             "C code: the name must be an identifier of C, such as finger, got '1st'");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { c_code_of(file, "a b", 100, ""); }),
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { c_code_of(file, "a b", 100); }),
             "C code: the name must be an identifier of C, such as finger, got 'a b'");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { c_code_of(file, "finger", 0, ""); }),
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { c_code_of(file, "finger", 0); }),
             "C code: the sensor's rate must be 1 to 100000 Hz, got 0");
   file.ranges.reset();
-  EXPECT_EQ(what_of<std::runtime_error>([&] { c_code_of(file, "finger", 100, ""); }),
-            "the model was saved without the ranges of its values, which C code in int8 needs; train it anew "
-            "with this version");
+  EXPECT_EQ(what_of<std::runtime_error>([&] { c_code_of(file, "finger", 100); }),
+            "the model was saved without the ranges of its values, which int8 needs; train it anew with this "
+            "version, or take precision fp32");
 }
 
 TEST(CCode, RefusesLayersThatItsSixteenBitsCannotCount) {
   SuperTacSettings wide = tiny();
   wide.rows = wide.columns = 16, wide.channels = 128, wide.latent = 1, wide.rcabs = 0, wide.scale = 2;
   wide.timesteps = 32;
-  EXPECT_ERROR(c_code_of(model_of(wide, {}), "finger", 100, ""), std::runtime_error,
+  EXPECT_ERROR(c_code_of(model_of(wide, {}), "finger", 100), std::runtime_error,
                "int8: a layer has a size or a distance of 32768, expected at most 32767; train a network of "
                "fewer channels");
 }

@@ -1,0 +1,33 @@
+#include "hardware/boards/listen.h"
+
+#include <algorithm>
+
+#include "hardware/ports/errors.h"
+
+namespace supertac {
+
+std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, double seconds,
+                          const std::function<bool()>& stop) {
+  constexpr std::size_t kMostBytes = std::size_t{16} << 20;
+  constexpr double kWaitS = 0.05;
+  std::vector<Heard> heard;
+  std::vector<std::byte> buffer(65536);
+  std::size_t bytes = 0;
+  const double until = opened.port->now() + seconds;
+  try {
+    while (!(stop && stop()) && opened.port->now() < until && bytes < kMostBytes) {
+      const Received got = opened.port->read(buffer, std::min(until, opened.port->now() + kWaitS));
+      if (got.count == 0) continue;
+      heard.push_back({got.time_s, {reinterpret_cast<const char*>(buffer.data()), got.count}});
+      // As open_port() makes a line of it for a sensor that is known to send text.
+      std::string& text = heard.back().bytes;
+      if (port.starts_with("udp:") && std::ranges::all_of(text, [](char c) { return c >= ' ' && c <= '~'; }))
+        text += '\n';
+      bytes += got.count;
+    }
+  } catch (const PortUnplugged&) {
+  }
+  return heard;
+}
+
+}  // namespace supertac

@@ -1,0 +1,113 @@
+#include <algorithm>
+#include <cstring>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "data/frames/probe.h"
+#include "data/sensors/frame_load.h"
+#include "hardware/boards/listen.h"
+#include "hardware/boards/sensor_reader.h"
+#include "library/guard.h"
+#include "library/supertac.h"
+
+using namespace supertac;
+using c::expect, c::expect_within, c::guarded;
+
+struct supertac_sensor {
+  Sensor sensor;
+  std::unique_ptr<SensorReader> reader;
+  std::string probed;
+};
+
+namespace {
+
+Sensor at_port(const supertac_sensor& s, const char* port) {
+  Sensor sensor = s.sensor;
+  if (port != nullptr) sensor.port = port;
+  return sensor;
+}
+
+}  // namespace
+
+supertac_sensor* supertac_sensor_new(const char* path) {
+  return guarded<supertac_sensor*>(nullptr, [&] {
+    expect(path != nullptr, "supertac_sensor_new: path is NULL");
+    return new supertac_sensor{read_sensor(path), nullptr, {}};
+  });
+}
+
+void supertac_sensor_free(supertac_sensor* sensor) { delete sensor; }
+
+int supertac_sensor_describe(const supertac_sensor* sensor, supertac_sensor_description* description) {
+  return guarded(-1, [&] {
+    expect(sensor != nullptr && description != nullptr, "supertac_sensor_describe: a pointer is NULL");
+    expect(description->size >= sizeof(std::size_t), "supertac_sensor_describe: set description.size first");
+    const Sensor& s = sensor->sensor;
+    const supertac_sensor_description full{
+        .size = std::min(description->size, sizeof(supertac_sensor_description)),
+        .name = s.name.c_str(),
+        .unit = s.scale.unit.c_str(),
+        .port = s.port.c_str(),
+        .rows = s.array.rows,
+        .columns = s.array.columns,
+        .channels = s.array.channels,
+        .signals = static_cast<int>(s.array.signals()),
+        .pitch_mm = {s.array.pitch_mm.x, s.array.pitch_mm.y},
+        .rate_hz = s.rate_hz,
+        .rest = s.scale.rest,
+        .span = s.scale.span};
+    std::memcpy(description, &full, full.size);
+    return 0;
+  });
+}
+
+int supertac_sensor_start(supertac_sensor* sensor, const char* port) {
+  return guarded(-1, [&] {
+    expect(sensor != nullptr, "supertac_sensor_start: sensor is NULL");
+    expect(sensor->reader == nullptr, "supertac_sensor_start: it is being read already");
+    const Sensor at = at_port(*sensor, port);
+    sensor->reader = std::make_unique<SensorReader>(open_port(at), at);
+    return 0;
+  });
+}
+
+int supertac_sensor_next(supertac_sensor* sensor, double wait_s, supertac_frame* about, float* signals) {
+  return guarded(-1, [&] {
+    expect(sensor != nullptr && about != nullptr && signals != nullptr,
+           "supertac_sensor_next: a pointer is NULL");
+    expect(sensor->reader != nullptr, "supertac_sensor_next: call supertac_sensor_start first");
+    expect_within("supertac_sensor_next: wait_s", wait_s, 0, 3600);
+    const std::optional<ReadFrame> frame = sensor->reader->next(wait_s);
+    if (!frame) return sensor->reader->ended() ? SUPERTAC_ENDED : 0;
+    const FrameLoad load = load_of(frame->signals, sensor->sensor.array.channels, sensor->sensor.scale);
+    *about = {frame->time_s, load.total_force, load.saturated};
+    std::ranges::copy(frame->signals, signals);
+    return 1;
+  });
+}
+
+int supertac_sensor_lost(supertac_sensor* sensor, unsigned long long* missing, unsigned long long* dropped) {
+  return guarded(-1, [&] {
+    expect(sensor != nullptr && missing != nullptr && dropped != nullptr,
+           "supertac_sensor_lost: a pointer is NULL");
+    expect(sensor->reader != nullptr, "supertac_sensor_lost: call supertac_sensor_start first");
+    const ReaderCounters counters = sensor->reader->counters();
+    *missing = counters.missing + counters.damaged, *dropped = counters.dropped;
+    return 0;
+  });
+}
+
+const char* supertac_sensor_probe(supertac_sensor* sensor, const char* port, double seconds) {
+  return guarded<const char*>(nullptr, [&] {
+    expect(sensor != nullptr, "supertac_sensor_probe: sensor is NULL");
+    expect(sensor->reader == nullptr, "supertac_sensor_probe: it is being read");
+    expect_within("supertac_sensor_probe: seconds", seconds, 0.1, 600);
+    const Sensor at = at_port(*sensor, port);
+    const ProbeReport report = probe(listen(open_port(at.port), at.port, seconds), at.port, at);
+    nlohmann::ordered_json json = {{"says", report.says}, {"draft", nullptr}};
+    if (report.draft) json["draft"] = json_of(*report.draft);
+    sensor->probed = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+    return sensor->probed.c_str();
+  });
+}
