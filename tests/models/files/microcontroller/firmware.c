@@ -4,6 +4,17 @@
 
 #include "finger.h"
 
+#if defined(__linux__) /* the same on a computer */
+#include <stdio.h>
+static FILE *input;
+static void open_input(void) { input = fopen("input", "rb"); }
+static int read_all(void *to, intptr_t size) { return fread(to, 1, (size_t)size, input) == (size_t)size; }
+static void print(const char *line) { fputs(line, stdout); }
+static uint32_t counted(void) { return 0; }
+static uint64_t instructions(uint32_t since) { return since; }
+static void begin_to_count(void) {}
+static void end(void) {}
+#else
 #if defined(__riscv)
 static intptr_t host(intptr_t operation, const void *arguments) {
   register intptr_t a0 __asm__("a0") = operation;
@@ -52,6 +63,18 @@ static int read_all(void *to, intptr_t size) {
   return host(0x06, arguments) == 0;
 }
 
+static void print(const char *line) { host(0x04, line); }
+
+static void end(void) {
+  const intptr_t done[] = {0x20026, 0};
+#if defined(__riscv) && __riscv_xlen == 64
+  host(0x18, done);
+#else
+  host(0x18, (const void *)done[0]);
+#endif
+}
+#endif
+
 static void say(const char *name, uint64_t value) {
   char line[64] = {0}, digits[24];
   int n = 0, i = 0;
@@ -61,7 +84,7 @@ static void say(const char *name, uint64_t value) {
   while ((value /= 10) > 0);
   while (i > 0) line[n++] = digits[--i];
   line[n++] = '\n';
-  host(0x04, line);
+  print(line);
 }
 
 /* FNV-1a over the bits. */
@@ -81,7 +104,6 @@ static float picture[FINGER_HEIGHT * FINGER_WIDTH], predicted_error[FINGER_HEIGH
 void run(void) {
   int32_t header[2], i;
   uint64_t most = 0, pictures = 0;
-  const intptr_t done[] = {0x20026, 0};
   begin_to_count();
   open_input();
   if (!read_all(header, sizeof header)) header[1] = 0;
@@ -108,9 +130,12 @@ void run(void) {
   say("hash", hash);
   say("instructions", most);
   say("self_test", finger_self_test(picture, predicted_error) == FINGER_SELF_TEST);
-#if defined(__riscv) && __riscv_xlen == 64
-  host(0x18, done);
-#else
-  host(0x18, (const void *)done[0]);
-#endif
+  end();
 }
+
+#if defined(__linux__)
+int main(void) {
+  run();
+  return 0;
+}
+#endif

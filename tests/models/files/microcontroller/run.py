@@ -1,4 +1,5 @@
-"""One hash of pictures on this computer and on emulated microcontrollers.
+"""One hash of pictures by this computer's programs, by the exported C on this and on emulated computers, and on emulated
+microcontrollers.
 
     run.py --bin build/bin [--model FILE --data DIR] [--windows N] [--frames N] [--csv FILE]
 
@@ -27,6 +28,13 @@ PARTS = [
     ("Cortex-M0+", ARM, "arm -M mps2-an385", "-mcpu=cortex-m0plus"),  # its code, on an M3
     ("rv32imc", RISCV, "riscv32 -M virt -bios none", "-march=rv32imc -mabi=ilp32"),
     ("rv64gc", RISCV, "riscv64 -M virt -bios none", "-march=rv64gc -mabi=lp64d -mcmodel=medany"),
+]
+# The same code on Linux: name, compiler, what runs it.
+COMPUTERS = [
+    ("x86-64 by GCC", "gcc -O3 -march=native", ""),
+    ("x86-64 by Clang", "clang -O3 -march=native", ""),
+    ("aarch64", "aarch64-linux-gnu-gcc -O2 -static", "qemu-aarch64"),
+    ("rv64gc on Linux", "riscv64-linux-gnu-gcc -O2 -static", "qemu-riscv64"),
 ]
 CC = ["-std=gnu99", "-O2", "-Wall", "-Wextra", "-Werror", "-ffunction-sections"]
 # How a program without a system is linked.
@@ -138,12 +146,23 @@ def sketch_compiles(folder):
     return ran.returncode == 0
 
 
-def run(machine, program, folder, given):
+def on_computer(compiler, emulator, folder):
+    """How the program is run on Linux."""
+    program = folder + "/computer"
+    subprocess.run([*compiler.split(), "-std=gnu99", "-Wall", "-Wextra", "-Werror", "-I" + folder, HERE + "/firmware.c",
+                    folder + "/finger.c", "-o", program], check=True)
+    return [*emulator.split(), program]
+
+
+def on_board(machine, program):
+    return [*("qemu-system-" + machine).split(), "-kernel", program, "-icount", "shift=0", "-semihosting-config",
+            "enable=on,target=native", "-nographic", "-monitor", "none", "-serial", "none"]
+
+
+def run(words, folder, given):
     with open(folder + "/input", "wb") as file:
         file.write(given)
-    ran = subprocess.run([*("qemu-system-" + machine).split(), "-kernel", program, "-icount", "shift=0",
-                          "-semihosting-config", "enable=on,target=native", "-nographic", "-monitor", "none", "-serial",
-                          "none"], cwd=folder, capture_output=True, text=True, timeout=7200)
+    ran = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=7200)
     said = dict(line.split() for line in (ran.stdout + ran.stderr).splitlines() if len(line.split()) == 2)
     return {key: int(said[key]) for key in ("pictures", "hash", "instructions", "self_test")}
 
@@ -164,6 +183,21 @@ def main():
               "picolibc-riscv64-unknown-elf and qemu-system-misc")
         return 77
     wrong, rows = 0, []
+
+    def same(name, words, folder):
+        """Draws all that is given, and says what came; a row's entries."""
+        nonlocal wrong
+        row = {}
+        for what, (data, count, expected) in given.items():
+            found = run(words, folder, data)
+            good = found["hash"] == expected and found["pictures"] == count and found["self_test"] == 1
+            wrong += not good
+            row.update({what: count, what + "_hash": f"{found['hash']:016x}", what + "_instructions": found["instructions"]})
+            print(f"{name}: {found['pictures']} pictures of {what}, hash {found['hash']:016x}, self-test "
+                  f"{'good' if found['self_test'] else 'BAD'}{'' if good else f', expected {expected:016x} of {count}'}"
+                  + (f", at most {found['instructions']} instructions a picture" if found["instructions"] else ""), flush=True)
+        return row
+
     with tempfile.TemporaryDirectory() as folder:
         args.raw = args.data  # frames as a sensor gives them: the device filters them as the training signals were
         if args.model is None:
@@ -174,18 +208,13 @@ def main():
                         repr(rate_of(recording)), "--force"], check=True, stdout=subprocess.DEVNULL)
         given = {"windows": windows_of(args, folder), "frames": frames_of(args, folder)}
         wrong += bool(shutil.which(ARM + "g++")) and not sketch_compiles(folder)
+        for name, compiler, emulator in COMPUTERS:
+            if all(shutil.which(words.split()[0]) for words in (compiler, emulator) if words):
+                same(name, on_computer(compiler, emulator, folder), folder)
         for name, tools, machine, flags in parts:
             program, flash, ram, code = built(tools, flags, folder, name)
-            row = {"part": name, "flash_bytes": flash, "code_bytes": code, "ram_bytes": ram}
-            for what, (data, count, expected) in given.items():
-                found = run(machine, program, folder, data)
-                same = found["hash"] == expected and found["pictures"] == count and found["self_test"] == 1
-                wrong += not same
-                row.update({what: count, what + "_hash": f"{found['hash']:016x}",
-                            what + "_instructions": found["instructions"]})
-                print(f"{name}: {found['pictures']} pictures of {what}, hash {found['hash']:016x}, self-test {'good' if found['self_test'] else 'BAD'}"
-                      f"{'' if same else f', expected {expected:016x} of {count}'}, "
-                      f"at most {found['instructions']} instructions a picture")
+            row = {"part": name, "flash_bytes": flash, "code_bytes": code, "ram_bytes": ram,
+                   **same(name, on_board(machine, program), folder)}
             print(f"{name}: {flash} bytes of flash, {code} of them code, {ram} of RAM with the window")
             rows.append(row)
     if args.csv:
