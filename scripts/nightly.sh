@@ -60,14 +60,13 @@ for part in "$@"; do
         note portable "the same bits in an empty folder and without AVX"
       else note portable "fails"; fi
       ;;
-    wheel)  # Python's package as pip makes it
-      scripts/setup.sh python3-venv
+    wheel)  # Python's package: its types, and as a wheel where nothing else of ours is
+      scripts/wheel.sh
       python3 -m venv build-venv
-      build-venv/bin/pip install -q ./python
-      cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release >/dev/null
-      cmake --build build --target supertac-simulate
-      build/bin/supertac-simulate --out build-venv/data --plates 6_Ridges --passes 1 --speeds 10 --quiet --force
-      if build-venv/bin/python examples/tour.py build-venv/data; then note wheel "trains and draws"; else note wheel "fails"; fi
+      build-venv/bin/pip install -q mypy dist/supertac-*.whl
+      if (cd python && ../build-venv/bin/mypy supertac) && build-venv/bin/python tests/python/wheel_test.py; then
+        note wheel "no remark on its types; trains and draws"
+      else note wheel "fails"; fi
       ;;
     coverage)
       cmake -S . -B build-coverage -G Ninja -DCMAKE_BUILD_TYPE=Debug -DSUPERTAC_QUICK_BUILD=ON -DSUPERTAC_MPI=OFF \
