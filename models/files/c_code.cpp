@@ -304,7 +304,7 @@ uint64_t NAME_self_test(float picture[)" +
 )";
 }
 
-void check(const ModelFile& file, const std::string& name, double sensor_hz) {
+void check(const std::string& name, double sensor_hz) {
   const bool identifier =
       !name.empty() && std::isdigit(static_cast<unsigned char>(name[0])) == 0 &&
       std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
@@ -319,7 +319,7 @@ void check(const ModelFile& file, const std::string& name, double sensor_hz) {
 
 CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz,
                 std::vector<ChainLink> chain) {
-  check(file, name, sensor_hz);
+  check(name, sensor_hz);
   const auto plan = IntegerPlan::of(*file.model, file.int8_ranges());
   Writer writer(*plan);
   const std::string top = "/* " + name + ": tactile super-resolution, written by supertac-export";
