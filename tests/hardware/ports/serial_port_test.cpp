@@ -121,7 +121,7 @@ TEST(SerialPort, TimeOutAndEndOfFileAreDifferent) {
                "check the cable and start again, nothing is resumed");
 }
 
-// Within 100 ms: bench/studies/rig/rig_unplug_runs. Here it is noticed at all, before the wait is over.
+// Within 100 ms: bench/results/rig/unplug.csv. Here it is noticed at all, before the wait is over.
 TEST(SerialPort, UnpluggingEndsTheWait) {
   for (int i = 0; i < 20; ++i) {
     const TemporaryFolder folder;
