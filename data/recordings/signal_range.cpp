@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/files/file.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -15,14 +16,37 @@ constexpr double kAboveRest = 0.25;
 
 }  // namespace
 
+std::string contradiction(std::span<const float> signals, const SignalScale& scale) {
+  constexpr double kMostOutside = 0.5, kMargin = 0.25, kShare = 0.01, kFarWider = 10;
+  if (signals.empty()) return {};
+  const double low = scale.low(), high = scale.high(), margin = kMargin * (high - low);
+  const auto outside =
+      std::ranges::count_if(signals, [&](double v) { return v < low - margin || v > high + margin; });
+  const auto [least, most] = std::ranges::minmax(signals);
+  const auto whole = [](float v) { return v == std::round(v); };
+  // At rest a sensor of counts may stay at 0 and 1 as well.
+  const bool shares = least >= -kShare && most <= 1 + kShare && most - least > 0.5F &&
+                      high - low >= kFarWider && !std::ranges::all_of(signals, whole);
+  if (static_cast<double>(outside) <= kMostOutside * static_cast<double>(signals.size()) && !shares)
+    return {};
+  return "from " + format(least) + " to " + format(most) + ", the sensor's range is " + format(low) + " to " +
+         format(high) + " " + scale.unit;
+}
+
 SignalRange SignalRange::of_folder(const std::string& dir, const std::vector<std::string>& plates,
-                                   const ReadingWatch& watch) {
+                                   const ReadingWatch& watch, bool any_signals) {
   SignalRange range;
   const std::vector<std::string> paths = list_recordings(dir);
   for (std::size_t i = 0; i < paths.size(); ++i) {
     if (watch) watch(i, paths.size());
     const Recording recording = read_recording(paths[i]);
-    if (plates.empty() || std::ranges::find(plates, recording.plate) != plates.end()) range.add(recording);
+    if (!plates.empty() && std::ranges::find(plates, recording.plate) == plates.end()) continue;
+    // Older ones state none: theirs is the rig's.
+    if (!any_signals && recording.signal_scale != SignalScale{})
+      if (const std::string why = contradiction(recording.volts, recording.signal_scale); !why.empty())
+        throw FileError(
+            paths[i], "has signals " + why + "; import it anew with the file of its sensor, or give --range");
+    range.add(recording);
   }
   return range;
 }

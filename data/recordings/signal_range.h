@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,14 +16,21 @@ namespace supertac {
 /// throws ends the reading.
 using ReadingWatch = std::function<void(std::size_t done, std::size_t all)>;
 
+/// Why these signals cannot be those of a sensor whose file states this scale, as the end of a sentence: "run
+/// from 0 to 1 ..., the sensor's range is 40 to 900 counts"; empty where they can. More than half of them lie
+/// beyond the range by a quarter of it, or they are shares of 0 to 1 under a range at least ten times as
+/// wide. Imports and training ask it, and the Python package does the same (python/supertac/recordings.py).
+std::string contradiction(std::span<const float> signals, const SignalScale& scale);
+
 /// The signals of some recordings, an even sample of each: 16 frames or more, of long ones a frame in 64, and
 /// of more than 16 million frames fewer.
 class SignalRange {
  public:
   /// Of a folder's recordings, only these plates when any are named. Throws as list_recordings() and
-  /// read_recording().
+  /// read_recording(), and FileError for signals that are not of the sensor that a recording states
+  /// (contradiction()), unless `any_signals`.
   static SignalRange of_folder(const std::string& dir, const std::vector<std::string>& plates,
-                               const ReadingWatch& watch = {});
+                               const ReadingWatch& watch = {}, bool any_signals = false);
   void add(const Recording& recording);
 
   /// Share of the signals that the scaling makes all the same: those below rest - span, and those more than

@@ -58,7 +58,8 @@ WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std:
   w.scale = static_cast<int>(recipe.model.scale);
   w.rate_hz = recipe.rate_hz;
   w.stride = static_cast<int>(recipe.stride);
-  const SignalRange range = SignalRange::of_folder(folders.data, recipe.plates, watch(folders.data));
+  const SignalRange range =
+      SignalRange::of_folder(folders.data, recipe.plates, watch(folders.data), recipe.range.has_value());
   range.felt().check();
   w.scaling = scaling_of(recipe, range, notes);
   WindowSet windows = WindowSet::load(folders.data, recipe.plates, w, watch(folders.data));

@@ -124,6 +124,8 @@ class Model:
             if found[key] != expected[key]:
                 raise ValueError(f"the recording's signals have {key} {found[key]!r}, the model's {expected[key]!r}; "
                                  "choose recordings and model of one sensor")
+        if why := recordings.contradiction(recording.volts, found):
+            raise ValueError(f"the recording's signals run {why}; import it anew with the file of its sensor")
 
     def windows(self, recording: recordings.Recording) -> tuple[Array, Array]:
         """Times and windows in volts of a recording that was filtered as the training was. Raises ValueError for one of

@@ -72,6 +72,20 @@ def _check(path: Path, recording: Recording) -> None:
         raise ValueError(f"{path}: its times do not increase; record or import it again")
 
 
+def contradiction(volts: np.ndarray, stated: dict) -> str:
+    """Why these cannot be signals of a sensor that is stated so, as data/recordings/signal_range.h; "" where they can."""
+    if "range" not in stated or not volts.size:
+        return ""
+    (low, high), least, most = stated["range"], float(volts.min()), float(volts.max())
+    margin = 0.25 * (high - low)
+    outside = ((volts < low - margin) | (volts > high + margin)).mean()
+    shares = (least >= -0.01 and most <= 1.01 and most - least > 0.5 and high - low >= 10
+              and (volts != np.round(volts)).any())
+    if outside <= 0.5 and not shares:
+        return ""
+    return f"from {least:g} to {most:g}, the sensor's range is {low:g} to {high:g} {stated['unit']}"
+
+
 def read_recording(path: Path) -> Recording:
     """A recording of any of our programs. Raises ValueError naming the file and what is wrong."""
     tensors, metadata = read(path)
@@ -99,6 +113,8 @@ def write_recording(path: Path, recording: Recording) -> None:
     if "truth" in tensors and not ((tensors["truth"] >= 0) & (tensors["truth"] <= 1)).all():
         raise ValueError(f"{path}: truth must lie in 0 to 1; scale it")
     _check(path, dataclasses.replace(recording, **tensors))
+    if why := contradiction(tensors["volts"], recording.signals):
+        raise ValueError(f"{path}: its signals run {why}; save them in the sensor's unit, or state their range")
     fields = {"plate": "unknown", "trial": "1", "pass": "1", "speed_mm_s": "0", "source": "python"} | recording.metadata
     fields = {key: str(value) for key, value in fields.items() if key not in ("checksum", "supertac_format")}
     if recording.array != RIG:

@@ -135,7 +135,9 @@ def refuses_what_programs_refuse(folder, recording):
     volts = recording.volts.copy()
     volts[3, 2] = np.nan
     bad = ({"volts": volts}, {"volts": recording.volts[:, :15]}, {"time_s": recording.time_s[::-1]}, {"time_s": recording.time_s[1:]},
-           {"truth": np.full((len(volts), 2, 2), 1.5)}, {"array": {"rows": 4}})
+           {"truth": np.full((len(volts), 2, 2), 1.5)}, {"array": {"rows": 4}},
+           {"volts": np.linspace(0, 1, volts.size).reshape(volts.shape),
+            "metadata": {"signals": json.dumps({"unit": "counts", "pressed": "higher", "range": [40, 900]})}})
     for change in bad:
         try:
             supertac.write_recording(folder / "bad.safetensors", dataclasses.replace(recording, **change))

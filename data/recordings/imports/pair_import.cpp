@@ -5,6 +5,7 @@
 
 #include "data/recordings/imports/film_truth.h"
 #include "data/recordings/imports/table_import.h"
+#include "data/recordings/signal_range.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 
@@ -123,6 +124,9 @@ std::vector<Recording> import_pairs(const SafetensorsFile& file, const std::opti
     if (like.array != sensor->array)
       throw FileError(file.path(), "holds frames of " + like.array.text() +
                                        ", expected those of the sensor, " + sensor->array.text());
+    if (const std::string why = contradiction(inputs, sensor->scale); !why.empty())
+      throw FileError(file.path(),
+                      "input runs " + why + "; save it in the sensor's unit, or mend the sensor's file");
   }
   const auto channels = static_cast<std::size_t>(like.array.channels),
              taxels = static_cast<std::size_t>(like.array.taxels()),

@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "data/recordings/signal_range.h"
 #include "data/sensors/rest_tracker.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
@@ -166,27 +167,20 @@ void check_rate(const std::string& path, const Table& table, std::size_t column,
                               "; is it in s, ms or us (--columns time=NAME:ms)?");
 }
 
-/// Refuses a column that most of the time says what the sensor cannot say.
+/// Refuses a column that says what the sensor cannot say.
 void check_taxel(const std::string& path, const Table& table, std::size_t column, std::size_t value,
                  const SignalScale& scale) {
-  const double margin = 0.25 * (scale.high() - scale.low());
-  std::size_t outside = 0;
-  double low = std::numeric_limits<double>::infinity(), high = -low;
+  const std::string which = name_of(table, column) + " as value " + std::to_string(value) + " of the frame ";
+  std::vector<float> signals;
   for (std::size_t i = 0; i < table.rows(); ++i) {
     const double v = table.row(i)[column];
     if (!std::isfinite(v) || std::abs(v) > std::numeric_limits<float>::max())
-      throw FileError(path, name_of(table, column) + " as value " + std::to_string(value) +
-                                " of the frame is " + format(v) + " in " + place(table, i) +
-                                ", expected a finite number");
-    outside += v < scale.low() - margin || v > scale.high() + margin;
-    low = std::min(low, v), high = std::max(high, v);
+      throw FileError(path,
+                      which + "is " + format(v) + " in " + place(table, i) + ", expected a finite number");
+    signals.push_back(static_cast<float>(v));
   }
-  if (2 * outside > table.rows())
-    throw FileError(path, name_of(table, column) + " as value " + std::to_string(value) +
-                              " of the frame runs from " + format(low) + " to " + format(high) +
-                              ", the sensor's range is " + format(scale.low()) + " to " +
-                              format(scale.high()) + " " + scale.unit +
-                              "; name another column, or mend the sensor's file");
+  if (const std::string why = contradiction(signals, scale); !why.empty())
+    throw FileError(path, which + "runs " + why + "; name another column, or mend the sensor's file");
 }
 
 /// NaN is a position that is not known.

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "data/recordings/simulator.h"
+#include "tests/expect_error.h"
+#include "tests/io/temporary_folder.h"
 
 namespace supertac {
 namespace {
@@ -27,6 +29,31 @@ TEST(SignalRange, OfTheRigIsTheRigs) {
   EXPECT_EQ(range.fitted().rest_volts, Scaling{}.rest_volts);
   EXPECT_EQ(range.fitted().span_volts, Scaling{}.span_volts);
   EXPECT_LT(range.clipped(Scaling{}), 0.01);
+}
+
+TEST(SignalRange, OfAnotherUnitContradictsWhatIsStated) {
+  const SignalScale counts{.unit = "counts", .rest = 0, .span = -1000};
+  const auto why = [&](std::vector<float> signals) { return contradiction(signals, counts); };
+  EXPECT_EQ(why({0, 0.5F, 1}), "from 0 to 1, the sensor's range is 0 to 1000 counts");
+  EXPECT_EQ(why({1300, 900, 2000}), "from 900 to 2000, the sensor's range is 0 to 1000 counts");
+  EXPECT_EQ(why({0, 1, 0, 0}), "") << "at rest";
+  EXPECT_EQ(why({0.3F, 0.4F}), "") << "at rest, filtered";
+  EXPECT_EQ(why({-200, 900, 1200}), "");
+  EXPECT_EQ(contradiction(std::vector<float>{0, 0.5F, 1}, {.unit = "1", .rest = 0, .span = -1}), "");
+  EXPECT_EQ(contradiction({}, counts), "");
+}
+
+// A folder is refused that says counts and holds shares, unless the user gives the range.
+TEST(SignalRange, OfAFolderIsWhatItStates) {
+  const TemporaryFolder folder;
+  Recording recording = even(0, 1);
+  recording.signal_scale = {.unit = "counts", .rest = 40, .span = -860};
+  recording.plate = "pairs", recording.source = "imported", recording.trial = recording.pass = 1;
+  write_recording(folder / "a.safetensors", recording);
+  EXPECT_ERROR((void)SignalRange::of_folder(folder.path(), {}), FileError,
+               "a.safetensors: has signals from 0 to 1, the sensor's range is 40 to 900 counts");
+  EXPECT_EQ(SignalRange::of_folder(folder.path(), {}, {}, true).clipped({.rest_volts = 1, .span_volts = 1}),
+            0);
 }
 
 TEST(SignalRange, OfAnotherSensorHoldsItsSignals) {

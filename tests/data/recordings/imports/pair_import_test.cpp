@@ -54,6 +54,22 @@ TEST(PairImport, ARecordingForEachGroupWithChannelsLastAndItsTruth) {
   EXPECT_EQ(read_recording(folder / "r.safetensors").truth, seven.truth);
 }
 
+TEST(PairImport, RefusesSharesUnderASensorOfCounts) {
+  const TemporaryFolder folder;
+  PairFile pairs;
+  for (float& value : pairs.input) value /= 299;
+  const auto import_with = [&](double span) {
+    const Sensor sensor{.array = {3, 5, 2.5, 2}, .scale = {.unit = "counts", .rest = 40, .span = -span}};
+    return import_pairs(SafetensorsFile::read(pairs.write(folder)), sensor);
+  };
+  EXPECT_ERROR(
+      (void)import_with(860), FileError,
+      "input runs from 0 to 1, the sensor's range is 40 to 900 counts; save it in the sensor's unit, "
+      "or mend the sensor's file");
+  for (float& value : pairs.input) value = 40 + 860 * value;
+  EXPECT_EQ(import_with(860).size(), 5U);
+}
+
 // Targets of other frames than the inputs: of 400 pairs each shows what the input felt 12 pairs before.
 TEST(PairImport, RefusesTargetsThatComeLate) {
   const TemporaryFolder folder;
