@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "data/frames/sensor_decoder.h"
+#include "data/sensors/layout.h"
 #include "data/sensors/touch_rests.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
@@ -140,6 +141,16 @@ double peak_of(const HeardFrames& frames, const Sensor& sensor, std::size_t taxe
   return peak > kPressedNoise * quantile(steps, 0.75) ? peak : 0;
 }
 
+// Who lies beside whom, from how far each taxel is from rest.
+FoundLayout layout_of(const HeardFrames& frames) {
+  std::vector<std::vector<float>> felt = frames.signals;
+  for (std::vector<float>& signal : felt) {
+    const float rest = median(std::vector(signal));
+    for (float& value : signal) value -= rest;
+  }
+  return find_layout(felt);
+}
+
 }  // namespace
 
 HeardFrames frames_of(const Sensor& sensor, std::span<const Heard> heard) {
@@ -194,7 +205,7 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   draft.array = known ? known->array : found->array;
   draft.frame = found->format;
   if (!known) draft.dead = found->dead;
-  const HeardFrames frames = frames_of(draft, heard);
+  HeardFrames frames = frames_of(draft, heard);
   if (frames.count < 2 || frames.frame_bytes < 0.5 * static_cast<double>(bytes.size())) {
     report.says.push_back("only " + std::to_string(frames.count) +
                           " frames were whole; probe for longer (--seconds)");
@@ -211,9 +222,18 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
                              : ", without a time stamp"));
   if (unknown_rate)
     report.says.push_back("assumed: " + format(kAssumedHz) + " frames a second; set \"rate_hz\"");
-  if (!known)
+  const bool nested = found->array != assumed_array(values);  // by lists of JSON, or rows of lines
+  if (const FoundLayout lie = known || nested ? FoundLayout{} : layout_of(frames); lie.layout) {
+    draft.array.rows = lie.layout->rows, draft.array.columns = lie.layout->columns;
+    draft.reorder(lie.layout->order);
+    frames = frames_of(draft, heard);
+    report.says.push_back(lie.says);
+    report.says.push_back("assumed: taxels " + draft.array.pitch_mm.text() + " mm apart; set \"pitch_mm\"");
+  } else if (!known) {
+    if (!lie.says.empty()) report.says.push_back(lie.says);
     report.says.push_back("assumed: " + draft.array.text() +
                           "; set \"rows\", \"columns\", \"channels\" and \"pitch_mm\"");
+  }
   look_at_signals(draft, frames, known, report.says);
   try {
     draft.check();

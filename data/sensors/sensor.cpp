@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -154,6 +155,33 @@ void Sensor::fill_silent(std::span<float> signals) const {
           static_cast<float>(mean(y - 1, y + 2, x - 1, x + 2).value_or(of_all));
     }
   }
+}
+
+void Sensor::reorder(std::vector<int> other) {
+  const auto taxels = static_cast<std::size_t>(array.taxels()),
+             channels = static_cast<std::size_t>(array.channels);
+  expect(other.empty() || other.size() == taxels, "order", std::to_string(taxels) + " places",
+         std::to_string(other.size()));
+  std::map<int, std::size_t> listed;  // by the place in the frame
+  for (std::size_t k = 0; k < (order.empty() ? taxels : order.size()); ++k)
+    if (const int at = order.empty() ? static_cast<int>(k) : order[k]; at >= 0) listed[at] = k;
+  Sensor found = *this;
+  found.dead.clear();
+  for (std::size_t k = 0; k < taxels; ++k) {
+    const int at = other.empty() ? static_cast<int>(k) : other.at(k);
+    if (at < 0) continue;
+    const auto from = listed.find(at);
+    expect(from != listed.end(), "rest_order", "the taxel that a frame sends as " + std::to_string(at),
+           "none: probe the rests again");
+    if (std::ranges::find(dead, static_cast<int>(from->second)) != dead.end())
+      found.dead.push_back(static_cast<int>(k));
+    for (std::size_t c = 0; c < channels; ++c) {
+      const std::size_t to = k * channels + c, of = from->second * channels + c;
+      if (!rest.empty()) found.rest.at(to) = rest.at(of);
+      if (!gain.empty()) found.gain.at(to) = gain.at(of);
+    }
+  }
+  rest = found.rest, gain = found.gain, dead = found.dead, order = std::move(other);
 }
 
 void Sensor::check() const {

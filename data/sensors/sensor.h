@@ -106,6 +106,9 @@ struct Sensor {
   void arrange(std::span<const float> sent, std::span<float> signals) const;
   /// A silent taxel gets the mean of the others around it, of all when there is none.
   void fill_silent(std::span<float> signals) const;
+  /// Takes another order; rest, gain and dead follow their taxels. Throws std::invalid_argument where they
+  /// name none for a place in the frame.
+  void reorder(std::vector<int> other);
   /// Throws std::invalid_argument where a member is out of its range, with its key in the file.
   void check() const;
   bool operator==(const Sensor&) const = default;

@@ -178,11 +178,11 @@ std::vector<float> floats_of(JsonObject& keys, const char* name) {
   return list;
 }
 
-std::vector<int> take_order(JsonObject& keys, const TaxelArray& array) {
-  const Json* value = keys.find("order");
+std::vector<int> take_order(JsonObject& keys, const char* key, const TaxelArray& array) {
+  const Json* value = keys.find(key);
   if (value == nullptr || *value == "row-major") return {};
-  if (value->is_array()) return keys.integers("order");
-  if (*value != "column-major") keys.wrong("order", "row-major, column-major, or a list of places", *value);
+  if (value->is_array()) return keys.integers(key);
+  if (*value != "column-major") keys.wrong(key, "row-major, column-major, or a list of places", *value);
   std::vector<int> order;
   for (int k = 0; k < array.taxels(); ++k)
     order.push_back(k % array.columns * array.rows + k / array.columns);
@@ -278,12 +278,16 @@ Sensor sensor_of_json(const std::string& text, const std::string& where) {
     sensor.frame = format_of(*frame, where);
     const Json* body = keys.find("body");
     sensor.body = body != nullptr ? body_of({*body, where, "body."}) : usual_body(sensor);
-    sensor.order = take_order(keys, sensor.array);
+    std::vector<int> order = take_order(keys, "order", sensor.array);
     sensor.dead = keys.integers("dead");
     sensor.rest = floats_of(keys, "rest");
     sensor.gain = floats_of(keys, "gain");
     sensor.follow_rest_s = keys.number("follow_rest_s", 0);
+    const bool listed = keys.find("rest_order") != nullptr;
+    sensor.order = listed ? take_order(keys, "rest_order", sensor.array) : order;
     keys.no_others();
+    sensor.check();
+    if (listed) sensor.reorder(std::move(order));
     sensor.check();
     return sensor;
   } catch (const JsonError& error) {
@@ -325,6 +329,8 @@ Json json_of(const Sensor& sensor) {
   if (!sensor.dead.empty()) json["dead"] = sensor.dead;
   for (const float rest : sensor.rest) json["rest"].push_back(rounded(double{rest}));
   for (const float gain : sensor.gain) json["gain"].push_back(rounded(double{gain}));
+  if (!sensor.dead.empty() || !sensor.rest.empty() || !sensor.gain.empty())
+    json["rest_order"] = sensor.order.empty() ? Json("row-major") : Json(sensor.order);
   if (sensor.follow_rest_s > 0) json["follow_rest_s"] = sensor.follow_rest_s;
   if (sensor.body != usual_body(sensor)) json["body"] = json_of(sensor.body);
   return json;

@@ -175,6 +175,35 @@ TEST(Probe, SaysWhatItAssumes) {
   expect_said(other, "frames of 12 values, expected the 25 of 5x5 taxels");
 }
 
+// Ten rows of six that a frame sends forwards and backwards in turn; a finger here and there; place 5 is
+// dead.
+TEST(Probe, FindsTheLayoutFromWhatNeighboursFeel) {
+  const RandomStream random(3, 1);
+  Sensor sensor = sensor_of(R"({"rows":10,"columns":6,"pressed":"higher","range":[100,900],"rate_hz":50,
+    "frame":{"kind":"text","separator":","}})");
+  std::vector<Heard> heard;
+  for (int n = 0; n < 1000; ++n) {
+    const auto finger = static_cast<std::uint64_t>(n / 25);
+    const double y = 10 * random.uniform(2 * finger) - 0.5, x = 6 * random.uniform(2 * finger + 1) - 0.5;
+    std::vector<double> values;
+    for (int k = 0; k < 60; ++k) {
+      const int row = k / 6, column = row % 2 == 0 ? k % 6 : 5 - k % 6;
+      const double press =
+          n % 25 < 12 ? 500 * std::exp(-(std::pow(row - y, 2) + std::pow(column - x, 2)) / 2) : 0;
+      values.push_back(k == 5 ? 100
+                              : std::round(100 + press +
+                                           3 * random.normal(1000 + static_cast<std::uint64_t>(60 * n + k))));
+    }
+    heard.push_back({100 + n / 50.0, sent_frame(sensor, values, n / 50.0)});
+  }
+  const ProbeReport report = drafted(heard);
+  expect_said(report, "taxels side by side feel alike: 10 rows of 6, every second one sent backwards");
+  EXPECT_EQ(report.draft->array.rows, 10);
+  EXPECT_EQ(report.draft->order[6], 11) << "the second row begins with the last that is sent of it";
+  EXPECT_EQ(report.draft->dead, std::vector{5});
+  expect_said(report, "assumed: taxels 3 mm apart");
+}
+
 TEST(Probe, WritesWhereEachTaxelRests) {
   Sensor sensor = sensor_of(R"({"rows":3,"columns":4,"pressed":"higher","range":[100,900],"rate_hz":50,
     "frame":{"kind":"text"}})");

@@ -123,7 +123,7 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
       {"rate_hz", 0.5, "\"rate_hz\" must be 1 to 100000, found 0.5"},
       {"pich_mm", 5,
        "knows no key 'pich_mm'; it may have name, rows, columns, channels, pitch_mm, unit, pressed, range, "
-       "rate_hz, port, frame, body, order, dead, rest, gain, follow_rest_s"},
+       "rate_hz, port, frame, body, order, dead, rest, gain, follow_rest_s, rest_order"},
       {"frame", nullptr, "has no \"frame\", such as {\"kind\": \"text\"}; supertac-stream --probe finds it"},
       {"frame.kind", "csv", "\"frame.kind\" must be one of board, text, json, binary, found \"csv\""},
       {"frame.kind", "board", "knows no key 'frame.separator'; it may have kind"},
@@ -199,6 +199,28 @@ TEST(Sensor, TaxelsOfOtherRestAndGainAreMadeAlike) {
   mat.gain.assign(12, 0.5F);  // from the end of the range where none says where it rests
   mat.arrange(frame, of_moved);
   for (std::size_t k = 0; k < 12; ++k) EXPECT_EQ(of_moved[k], 40 + (signals[k] - 40) / 2) << k;
+}
+
+TEST(Sensor, RestGainAndDeadFollowTheirTaxels) {
+  Json mat = Json::parse(kMat);
+  mat["rows"] = 2, mat["columns"] = 3, mat["channels"] = 1, mat.erase("order");
+  mat["dead"] = {2}, mat["rest"] = {40, 41, 42, 43, 44, 45}, mat["gain"] = {1, 2, 3, 4, 5, 6};
+  const Sensor before = sensor_of_json(mat.dump(), "mat.json");
+  mat = Json::parse(json_of(before).dump());
+  EXPECT_EQ(mat["rest_order"], "row-major");
+  mat["order"] = {0, 1, 2, 5, 4, 3};
+  const Sensor after = sensor_of_json(mat.dump(), "mat.json");
+  EXPECT_EQ(after.rest, (std::vector<float>{40, 41, 42, 45, 44, 43}));
+  EXPECT_EQ(after.gain, (std::vector<float>{1, 2, 3, 6, 5, 4}));
+  EXPECT_EQ(after.dead, std::vector{2});
+  EXPECT_EQ(sensor_of_json(json_of(after).dump(), "mat.json"), after) << "it says in which order they are";
+  mat["order"] = {5, 4, 2, 3, 1, 0}, mat["dead"] = {0};
+  EXPECT_EQ(sensor_of_json(mat.dump(), "mat.json").dead, std::vector{5});
+  mat["order"] = {0, 1, 2, 3, 4, -1}, mat["rest_order"] = {0, 1, 2, 3, -1, -1};
+  EXPECT_ERROR((void)sensor_of_json(mat.dump(), "mat.json"), FileError,
+               "the taxel that a frame sends as 4, found none: probe the rests again");
+  mat.erase("rest_order"), mat["order"] = {0, 1, 2, 5, 4, 3};
+  EXPECT_EQ(sensor_of_json(mat.dump(), "mat.json").rest, before.rest) << "old files list them as they stand";
 }
 
 TEST(Sensor, MutatedFilesAreTakenOrRefusedInOneLine) {
