@@ -227,8 +227,7 @@ int run(Arguments& a) {
       score_all(a, network, files.front(), windows, tested, baselines,
                 a.given("outputs") ? &outputs : nullptr, a.given("report") ? &page : nullptr);
   const nlohmann::ordered_json result = report(a, network, windows, tested, baselines, scores);
-  if (pictures)
-    write_pictures(network, files.front().interval_factors(), windows, tested.split.test, *pictures);
+  if (pictures) write_pictures(network, files.front().interval(), windows, tested.split.test, *pictures);
   if (a.given("outputs")) outputs.write(a.output("outputs"));
   if (a.given("map")) write_maps(a.output("map"), scores.map.maps(a.text("map").ends_with(".safetensors")));
   if (a.given("report"))

@@ -262,7 +262,8 @@ int supertac_map_cells(const supertac_map* map, int* height, int* width, double 
     MapCells cells = map->surface.cells(felt);
     if (values != nullptr) std::ranges::copy(cells.values, values);
     if (errors != nullptr) std::fill_n(errors, cells.values.size(), std::numeric_limits<float>::quiet_NaN());
-    map->model->file.interval_factors().half_widths(cells.values, cells.errors, cells.errors);
+    map->model->file.interval().half_widths(cells.values, static_cast<std::size_t>(felt.width), cells.errors,
+                                            cells.errors);
     if (errors != nullptr) std::ranges::copy(cells.errors, errors);
     return 0;
   });

@@ -82,7 +82,7 @@ void OutputsFile::write(const OutputPath& output) const {
   write_safetensors(output, {{"format", "supertac-outputs"}}, tensors);
 }
 
-void write_pictures(const Ensemble& model, const IntervalFactors& factors, const WindowSet& windows,
+void write_pictures(const Ensemble& model, const PixelInterval& interval, const WindowSet& windows,
                     std::span<const std::uint32_t> test, OutputFolder& folder) {
   std::vector<std::uint32_t> touching;
   std::map<std::size_t, std::vector<std::uint32_t>> by_pass;
@@ -92,7 +92,7 @@ void write_pictures(const Ensemble& model, const IntervalFactors& factors, const
   }
   const auto drawn = [&](const std::vector<std::uint32_t>& chosen, int side, bool down,
                          const std::string& title) {
-    return figure(draw_again(model, windows, chosen, factors), chosen, windows, side, down, title);
+    return figure(draw_again(model, windows, chosen, interval), chosen, windows, side, down, title);
   };
   write_png(folder.add("strips.png"), drawn(evenly_spaced(touching.empty() ? test : touching, kStrips), 96,
                                             true, "Windows in contact"));

@@ -34,7 +34,7 @@ class OutputsFile {
 /// strips.png: windows in contact spread over the test windows, input | output | truth and, where
 /// the network says it, half the width of a pixel's 90 % interval; and for each test pass
 /// film_<plate>_t<trial>_p<pass>.png. Throws FileError.
-void write_pictures(const Ensemble& model, const IntervalFactors& factors, const WindowSet& windows,
+void write_pictures(const Ensemble& model, const PixelInterval& interval, const WindowSet& windows,
                     std::span<const std::uint32_t> test, OutputFolder& folder);
 
 }  // namespace supertac

@@ -175,7 +175,8 @@ void TrustScores::add(const Drawn& drawn) {
     unlike_ += model_.novelty->unlike_training(signal_features(drawn.input, windows_.array())) ? 1 : 0;
   }
   if (!predicted_error.empty())
-    coverage_.add(windows_.pass_of(drawn.example), drawn.pictures[0], drawn.target, predicted_error);
+    coverage_.add(windows_.pass_of(drawn.example), drawn.pictures[0],
+                  static_cast<std::size_t>(windows_.image().width), drawn.target, predicted_error);
 }
 
 std::vector<std::pair<std::string, IntervalCoverage::Held>> TrustScores::classes() const {
@@ -183,11 +184,6 @@ std::vector<std::pair<std::string, IntervalCoverage::Held>> TrustScores::classes
   std::vector<std::pair<std::string, IntervalCoverage::Held>> classes;
   for (std::size_t h = 0; h < IntervalCoverage::kHeights; ++h)
     classes.emplace_back(kHeights[h], coverage_.of_height(h));
-  for (std::size_t level = 0; level < IntervalFactors::kLevels; ++level)
-    classes.emplace_back(level < IntervalFactors::kEdges.size()
-                             ? "drawn below " + format(IntervalFactors::kEdges[level], 2)
-                             : "drawn above " + format(IntervalFactors::kEdges.back(), 2),
-                         coverage_.of_level(level));
   std::erase_if(classes, [](const auto& one) { return one.second.pixels == 0; });
   return classes;
 }
@@ -196,14 +192,13 @@ std::vector<std::string> TrustScores::lines() const {
   std::vector<std::string> lines;
   const auto percent = [](double share) { return format(100 * share, 1) + " %"; };
   if (!coverage_.empty())
-    lines.push_back("intervals hold " + percent(coverage_.share()) + " of the pixels (factors " +
-                    model_.interval_factors().text() + "; " + coverage_.factors().text() + " would hold " +
-                    percent(IntervalCoverage::kCovered) + ")");
+    lines.push_back("intervals hold " + percent(coverage_.share()) + " of the pixels (interval " +
+                    model_.interval().text() + "; " + coverage_.found().text() + " would hold " +
+                    percent(IntervalCoverage::kCovered) + " at each height of the truth)");
   std::string truths;
   for (const auto& [name, held] : classes())
-    if (name.starts_with("true"))
-      truths += (truths.empty() ? "" : ", ") + name.substr(5) + " " + percent(held.share) + " (+-" +
-                format(held.half_width, 2) + ")";
+    truths += (truths.empty() ? "" : ", ") + name.substr(5) + " " + percent(held.share) + " (+-" +
+              format(held.half_width, 2) + ")";
   if (!truths.empty()) lines.push_back("intervals hold by height of the truth: " + truths);
   if (judged_ > 0)
     lines.push_back(percent(static_cast<double>(unlike_) / static_cast<double>(judged_)) +
@@ -215,9 +210,9 @@ nlohmann::ordered_json TrustScores::to_json() const {
   const auto number = [](double v) { return std::isfinite(v) ? nlohmann::ordered_json(v) : nullptr; };
   nlohmann::ordered_json json;
   if (!coverage_.empty()) {
-    json["factor"] = model_.interval_factors().text();
+    json["interval"] = model_.interval().text();
     json["coverage"] = coverage_.share();
-    json["factor_found"] = coverage_.factors().text();
+    json["interval_found"] = coverage_.found().text();
     for (const auto& [name, held] : classes())
       json["coverage_of"][name] = {
           {"share", number(held.share)}, {"half_width", number(held.half_width)}, {"pixels", held.pixels}};

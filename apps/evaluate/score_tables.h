@@ -109,7 +109,7 @@ std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result,
 /// true.
 class TrustScores {
  public:
-  /// `model`: whose factor and novelty are judged; must outlive this, as the windows.
+  /// `model`: whose interval and novelty are judged; must outlive this, as the windows.
   TrustScores(const WindowSet& windows, const ModelFile& model)
       : windows_(windows), model_(model), coverage_(model.interval_factors()) {}
   /// Windows of a pass come in the order of time. Without a predicted error nothing is counted of it.
@@ -117,12 +117,11 @@ class TrustScores {
 
   /// For people: nothing for a model that says nothing of its pictures.
   std::vector<std::string> lines() const;
-  /// {"factor", "coverage", "factor_found", "coverage_of": {"true 0": {"share", "half_width", "pixels"},
-  /// "true to 0.2", "true to 0.5", "true above 0.5", "drawn below 0.02" ... "drawn above 0.5"},
-  /// "unlike_training"}
+  /// {"interval", "coverage", "interval_found", "coverage_of": {"true 0": {"share", "half_width", "pixels"},
+  /// "true to 0.2", "true to 0.5", "true above 0.5"}, "unlike_training"}
   nlohmann::ordered_json to_json() const;
 
-  /// By what is there and by what was drawn, in words; without those that no pixel belongs to.
+  /// By how high the truth is, in words; without those that no pixel belongs to.
   std::vector<std::pair<std::string, IntervalCoverage::Held>> classes() const;
 
  private:

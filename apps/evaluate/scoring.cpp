@@ -81,7 +81,7 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, Tes
 }
 
 std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& windows,
-                                    std::span<const std::uint32_t> chosen, const IntervalFactors& factors) {
+                                    std::span<const std::uint32_t> chosen, const PixelInterval& interval) {
   std::vector<ShownWindow> shown;
   for_each_output(network, windows, chosen, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < b.size(); ++n) {
@@ -90,7 +90,8 @@ std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& wi
                       .drawn = {drawn.begin(), drawn.end()},
                       .truth = {truth.begin(), truth.end()},
                       .half_widths = {}};
-      factors.half_widths(drawn, b.predicted_error(n), one.half_widths);
+      interval.half_widths(drawn, static_cast<std::size_t>(windows.image().width), b.predicted_error(n),
+                           one.half_widths);
       shown.push_back(std::move(one));
     }
     return true;

@@ -47,7 +47,7 @@ struct ShownWindow {
 
 /// The windows `chosen`, drawn once more.
 std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& windows,
-                                    std::span<const std::uint32_t> chosen, const IntervalFactors& factors);
+                                    std::span<const std::uint32_t> chosen, const PixelInterval& interval);
 
 /// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.
 void draw_all(const Arguments& a, const Ensemble& network, const WindowSet& windows,

@@ -42,7 +42,7 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
       output_(network_.estimate(input_)),  // the first run takes memory and chooses kernels
       source_scale_(source.signal_scale()),
       period_s_(source.period_s()),
-      interval_factors_(model_.interval_factors()) {
+      interval_(model_.interval()) {
   features_.resize(signal_feature_count(model_.array(), input_.values().size() / model_.array().signals()));
   for (const float value : output_.picture.values()) {
     if (!std::isfinite(value))
@@ -78,7 +78,8 @@ std::span<const float> PictureMaker::picture() {
   if (!window_.window(input_.values())) return {};
   output_ = network_.estimate(input_);
   if (output_.predicted_error.defined())
-    interval_factors_.half_widths(output_.picture.values(), output_.predicted_error.values(), half_widths_);
+    interval_.half_widths(output_.picture.values(), static_cast<std::size_t>(image().width),
+                          output_.predicted_error.values(), half_widths_);
   if (model_.novelty) {
     signal_features(input_.values(), model_.array(), features_);
     distance_ = model_.novelty->distance(features_);

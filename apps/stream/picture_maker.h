@@ -31,7 +31,7 @@ class PictureMaker {
   std::span<const float> predicted_errors() const {
     return output_.predicted_error.defined() ? output_.predicted_error.values() : std::span<const float>();
   }
-  const IntervalFactors& interval_factors() const { return interval_factors_; }
+  const PixelInterval& interval() const { return interval_; }
   /// How far the window that it was drawn from is from those of training, and where "unlike" begins
   /// (models/inference/novelty.h); nothing when the model does not say.
   std::optional<double> distance() const { return distance_; }
@@ -59,7 +59,7 @@ class PictureMaker {
   std::vector<float> features_;
   SignalScale source_scale_;
   double period_s_;
-  IntervalFactors interval_factors_;
+  PixelInterval interval_;
   std::vector<float> half_widths_;
   std::optional<double> distance_;
   static constexpr double kRestS = 0.2;

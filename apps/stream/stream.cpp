@@ -160,7 +160,8 @@ void Stream::write_map() const {
 
 NamedMap Stream::named_map() const {
   MapCells cells = map_->cells(map_->felt());
-  maker_->interval_factors().half_widths(cells.values, cells.errors, cells.errors);
+  maker_->interval().half_widths(cells.values, static_cast<std::size_t>(cells.region.width), cells.errors,
+                                 cells.errors);
   return {"surface", std::move(cells), map_->grid().pixel_mm};
 }
 

@@ -69,12 +69,11 @@ void declare_window_training(Arguments& a) {
       "frame",
       "standard");
   a.option(
-      "interval-factor", "X,...",
-      "half the width of a pixel's 90 % interval in units of its predicted error, one for all or one each "
-      "for "
-      "pictures below 0.02, 0.05, 0.2, 0.5 and above, as supertac-evaluate finds them on passes that the "
-      "network has not seen; split group finds them on the tested groups",
-      IntervalFactors{}.text());
+      "interval-factor", "X,Y",
+      "half the width of a pixel's 90 % interval: X times the largest difference from a pixel around it, "
+      "and Y times its predicted error, as supertac-evaluate finds Y on passes that the network has not "
+      "seen; one number is Y alone; split group finds Y on the tested groups",
+      PixelInterval{}.text());
   a.flag(
       "last-frame",
       "give the last frame a way of its own into the picture, beside the latents: for sensors of which one "
@@ -135,11 +134,10 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
     r.mirror = name == "mirror";
   }
   if (a.given("interval-factor")) {
-    r.interval_factor = IntervalFactors::read(a.text("interval-factor"));
+    r.interval_factor = PixelInterval::read(a.text("interval-factor"));
     if (!r.interval_factor)
-      throw UsageError(
-          "--interval-factor: expected one number or five, separated by ',', from 0.05 to 100, found " +
-          in_quotes(a.text("interval-factor")));
+      throw UsageError("--interval-factor: expected X,Y or Y, X from 0 to 10 and Y from 0.05 to 100, found " +
+                       in_quotes(a.text("interval-factor")));
   }
   if (a.flag("last-frame")) r.model.last_frame_path = true;
   if (a.given("beta") && !r.sampling)

@@ -125,8 +125,8 @@ std::optional<double> InputSettings::filter_left(double done_s) const {
   return done_s > 0 ? std::nullopt : std::optional(wanted_s);
 }
 
-IntervalFactors ModelFile::interval_factors() const {
-  return IntervalFactors::read(value_or(metadata, "interval_factor")).value_or(IntervalFactors{});
+PixelInterval ModelFile::interval() const {
+  return PixelInterval::read(value_or(metadata, "interval_factor")).value_or(PixelInterval{});
 }
 
 const ActivationRanges& ModelFile::int8_ranges() const {

@@ -44,7 +44,7 @@ struct ModelFile {
   std::map<std::string, std::string> metadata;
 
   /// What its predicted errors mean: the entry interval_factor, where there is one.
-  IntervalFactors interval_factors() const;
+  PixelInterval interval() const;
   /// What int8 needs. Throws std::runtime_error where the file has none.
   const ActivationRanges& int8_ranges() const;
   /// The sensor it was trained on.

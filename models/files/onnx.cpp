@@ -234,7 +234,7 @@ std::string Exporter::picture_of(const ModelFile& file) {
   if (drawn.predicted_error.defined())
     output("predicted_error", drawn.predicted_error, "How far from the truth a pixel is expected to be.");
   auto metadata = file.metadata;
-  if (drawn.predicted_error.defined()) metadata.emplace("interval_factor", IntervalFactors{}.text());
+  if (drawn.predicted_error.defined()) metadata.emplace("interval_factor", PixelInterval{}.text());
   return graph.file("1", "SuperTac: volts in, picture out.", metadata);
 }
 

@@ -1,102 +1,99 @@
 #include "models/inference/interval.h"
 
 #include <cmath>
-#include <numeric>
 
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
 namespace supertac {
+namespace {
 
-std::size_t IntervalFactors::level_of(float picture) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(kEdges, [height = std::abs(picture)](float edge) { return height >= edge; }));
+// The largest difference between a pixel and those around it; NaN for NaN.
+float steepest(std::span<const float> picture, std::size_t width, std::size_t pixel) {
+  const std::size_t row = pixel / width, column = pixel % width, rows = picture.size() / width;
+  const float value = picture[pixel];
+  float most = value - value;
+  for (std::size_t y = row - (row > 0); y <= std::min(row + 1, rows - 1); ++y)
+    for (std::size_t x = column - (column > 0); x <= std::min(column + 1, width - 1); ++x)
+      most = std::max(most, std::abs(picture[y * width + x] - value));  // `most` where that is NaN
+  return most;
 }
 
-void IntervalFactors::half_widths(std::span<const float> picture, std::span<const float> predicted_error,
-                                  std::vector<float>& widths) const {
+}  // namespace
+
+void PixelInterval::half_widths(std::span<const float> picture, std::size_t width,
+                                std::span<const float> predicted_error, std::vector<float>& widths) const {
   widths.resize(predicted_error.size());
-  for (std::size_t i = 0; i < widths.size(); ++i) widths[i] = half_width(picture[i], predicted_error[i]);
+  const auto along = static_cast<float>(shift), beside = static_cast<float>(factor);
+  for (std::size_t i = 0; i < widths.size(); ++i)
+    widths[i] = along * steepest(picture, width, i) + beside * at_least(predicted_error[i]);
 }
 
-std::string IntervalFactors::text() const {
-  if (std::ranges::all_of(of_level, [&](double f) { return f == of_level[0]; })) return format(of_level[0]);
-  std::string text;
-  for (const double factor : of_level) text += (text.empty() ? "" : ",") + format(factor);
-  return text;
-}
+std::string PixelInterval::text() const { return (shift > 0 ? format(shift) + "," : "") + format(factor); }
 
-std::optional<IntervalFactors> IntervalFactors::read(const std::string& text) {
+std::optional<PixelInterval> PixelInterval::read(const std::string& text) {
   const std::vector<std::string> parts = comma_list(text);
-  if (parts.size() != 1 && parts.size() != kLevels) return std::nullopt;
-  IntervalFactors factors;
-  for (std::size_t level = 0; level < kLevels; ++level) {
-    const auto factor = parse_double(parts[parts.size() == 1 ? 0 : level]);
-    if (!factor || !(*factor >= 0.05 && *factor <= 100)) return std::nullopt;
-    factors.of_level[level] = *factor;
-  }
-  return factors;
+  if (parts.empty() || parts.size() > 2) return std::nullopt;
+  const auto shift = parts.size() == 2 ? parse_double(parts.front()) : 0.0,
+             factor = parse_double(parts.back());
+  if (!shift || !factor || !(*shift >= 0 && *shift <= 10) || !(*factor >= 0.05 && *factor <= 100))
+    return std::nullopt;
+  return PixelInterval{*shift, *factor};
 }
 
-void IntervalCoverage::add(std::size_t pass, std::span<const float> picture, std::span<const float> truth,
-                           std::span<const float> predicted_error) {
+void IntervalCoverage::add(std::size_t pass, std::span<const float> picture, std::size_t width,
+                           std::span<const float> truth, std::span<const float> predicted_error) {
   if (passes_.empty() || passes_.back().number != pass) passes_.push_back({.number = pass});
-  Pass& counts = passes_.back();
+  judged_.half_widths(picture, width, predicted_error, widths_);
   for (std::size_t i = 0; i < picture.size(); ++i) {
-    const double error = std::abs(double{picture[i]} - double{truth[i]}),
-                 half_width = double{judged_.half_width(picture[i], predicted_error[i])},
-                 bin = error / double{at_least(predicted_error[i])} * kBinsPerUnit;
-    const std::size_t level = IntervalFactors::level_of(picture[i]), height = truth[i] == 0                ? 0
-                                                                              : std::abs(truth[i]) <= 0.2F ? 1
-                                                                              : std::abs(truth[i]) <= 0.5F
-                                                                                  ? 2
-                                                                                  : 3;
-    const bool within = error <= half_width;
-    if (bin < double{kBins}) ++counts.ratios[level][static_cast<std::size_t>(bin)];
-    ++counts.pixels[level];
-    counts.within += within ? 1 : 0;
-    for (Sum* sum : {&heights_[height], &levels_[level]})
-      sum->within += within ? 1 : 0, sum->half_width += half_width, sum->pixels += 1;
+    const auto height = static_cast<std::size_t>(
+        std::ranges::count_if(kEdges, [t = std::abs(truth[i])](float edge) { return t > edge; }));
+    Height& counts = passes_.back().heights[height];
+    const double error = std::abs(double{picture[i]} - double{truth[i]}), half_width = double{widths_[i]},
+                 predicted = double{at_least(predicted_error[i])};
+    const double ratio = (error - half_width) / predicted + judged_.factor;
+    const double bin = std::max(0.0, std::ceil(ratio * kBinsPerUnit - 1e-6) - 1);
+    if (bin < double{kBins}) ++counts.ratios[static_cast<std::size_t>(bin)];
+    ++counts.pixels;
+    counts.within += error <= half_width ? 1 : 0;
+    counts.half_width += half_width;
   }
 }
 
 double IntervalCoverage::share() const {
   double sum = 0;
-  for (const Pass& pass : passes_)
-    sum += static_cast<double>(pass.within) /
-           static_cast<double>(std::accumulate(pass.pixels.begin(), pass.pixels.end(), std::uint64_t{0}));
+  for (const Pass& pass : passes_) {
+    double within = 0, pixels = 0;
+    for (const Height& h : pass.heights)
+      within += static_cast<double>(h.within), pixels += static_cast<double>(h.pixels);
+    sum += within / pixels;
+  }
   return sum / static_cast<double>(passes_.size());
 }
 
-std::optional<double> IntervalCoverage::factor_of(std::size_t level) const {
-  std::array<double, kBins> share{};  // of the ratios in each bin, mean over passes
-  double passes = 0;
+IntervalCoverage::Held IntervalCoverage::of_height(std::size_t height) const {
+  Held held;
   for (const Pass& pass : passes_) {
-    if (pass.pixels[level] == 0) continue;
-    ++passes;
-    for (std::size_t bin = 0; bin < kBins; ++bin)
-      share[bin] += pass.ratios[level][bin] / static_cast<double>(pass.pixels[level]);
+    const Height& h = pass.heights[height];
+    held.share += static_cast<double>(h.within), held.half_width += h.half_width;
+    held.pixels += static_cast<double>(h.pixels);
   }
-  if (passes == 0) return std::nullopt;
-  double covered = 0;
-  for (std::size_t bin = 0; bin < kBins; ++bin) {
-    covered += share[bin];
-    if (covered >= kCovered * passes * (1 - 1e-12)) return static_cast<double>(bin + 1) / kBinsPerUnit;
-  }
-  return double{kBins} / kBinsPerUnit;
+  return {held.share / held.pixels, held.half_width / held.pixels, held.pixels};
 }
 
-IntervalFactors IntervalCoverage::factors() const {
-  IntervalFactors factors;
-  constexpr std::size_t kMiddle = IntervalFactors::kLevels / 2;
-  std::optional<double> any;
-  for (std::size_t level = 0; level < IntervalFactors::kLevels && !any; ++level) any = factor_of(level);
-  factors.of_level[kMiddle] = factor_of(kMiddle).value_or(*any);
-  for (std::size_t level = kMiddle; level-- > 0;)
-    factors.of_level[level] = factor_of(level).value_or(factors.of_level[level + 1]);
-  for (std::size_t level = kMiddle + 1; level < IntervalFactors::kLevels; ++level)
-    factors.of_level[level] = factor_of(level).value_or(factors.of_level[level - 1]);
-  return factors;
+PixelInterval IntervalCoverage::found() const {
+  std::size_t least = 0;  // bins
+  for (std::size_t height = 0; height < kHeights; ++height) {
+    double passes = 0, covered = 0;
+    for (const Pass& pass : passes_) passes += pass.heights[height].pixels > 0 ? 1 : 0;
+    std::size_t bin = 0;
+    for (; bin < kBins && covered < kCovered * passes * (1 - 1e-12); ++bin)
+      for (const Pass& pass : passes_)
+        if (const Height& h = pass.heights[height]; h.pixels > 0)
+          covered += h.ratios[bin] / static_cast<double>(h.pixels);
+    least = std::max(least, bin);
+  }
+  return {judged_.shift, static_cast<double>(std::max<std::size_t>(least, 1)) / kBinsPerUnit};
 }
 
 }  // namespace supertac

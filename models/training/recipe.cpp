@@ -46,8 +46,9 @@ void Recipe::check() const {
   require(stride >= 1 && stride <= 100'000, "stride from 1 to 100000", static_cast<double>(stride));
   require(random_plates >= 0 && random_plates <= 50'000, "random_plates from 0 to 50000",
           static_cast<double>(random_plates));
-  for (const double factor : interval_factor.value_or(IntervalFactors{}).of_level)
-    require(factor >= 0.05 && factor <= 100, "interval_factor from 0.05 to 100", factor);
+  const PixelInterval interval = interval_factor.value_or(PixelInterval{});
+  require(PixelInterval::read(interval.text()).has_value(), "interval_factor from 0.05 to 100",
+          interval.factor);
   if (range) require(std::abs(range->span_volts) > 1e-6, "a span that is not 0", range->span_volts);
   if (per_window && model.timesteps == 1)
     throw std::invalid_argument(
@@ -140,7 +141,7 @@ Recipe Recipe::of(const ModelFile& file, const std::string& path) {
   r.range = file.input.scaling;
   r.per_window = file.input.scaling.per_window;
   if (file.metadata.contains("interval_factor") && !file.metadata.contains("interval_factor_found"))
-    r.interval_factor = file.interval_factors();
+    r.interval_factor = file.interval();
   try {
     r.split = split_kind(entry("split"));
     r.check();

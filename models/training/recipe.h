@@ -42,7 +42,7 @@ struct Recipe : TrainingPace {
   bool per_window = true;          ///< whether a window is brought to its own rest and gain
   std::int64_t random_plates = 0;  ///< simulated passes besides, each over a plate of its own
   /// Of the model's file; empty: of split group found on the tested groups, else the default ones.
-  std::optional<IntervalFactors> interval_factor;
+  std::optional<PixelInterval> interval_factor;
 
   /// Throws std::invalid_argument naming the setting, its range and what was given.
   void check() const;

@@ -165,7 +165,9 @@ TEST_F(Library, MapsAsTheCppLibraryDoes) {
   ASSERT_EQ(supertac_map_cells(map, &height, &width, corner, values.data(), widths.data()), 0);
   for (std::size_t i = 0; i < values.size(); ++i)
     ASSERT_EQ(std::bit_cast<std::uint32_t>(values[i]), std::bit_cast<std::uint32_t>(cells.values[i])) << i;
-  EXPECT_EQ(widths[20], file_.interval_factors().half_width(cells.values[20], cells.errors[20]));
+  std::vector<float> half_widths = cells.errors;
+  file_.interval().half_widths(cells.values, static_cast<std::size_t>(width), half_widths, half_widths);
+  EXPECT_EQ(widths, half_widths);
   EXPECT_EQ(supertac_map_add(map, 0, 0, nullptr, nullptr), -1);
   EXPECT_STREQ(supertac_error(), "supertac_map_add: a pointer is NULL");
   supertac_map_free(map);

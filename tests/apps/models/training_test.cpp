@@ -209,7 +209,7 @@ TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   }
   for (const char* part : {"flat", "air"}) EXPECT_TRUE(json[part].contains("ghost_rate")) << part;
   EXPECT_TRUE(json["contact"].contains("miss_rate"));
-  for (const char* key : {"factor", "coverage", "factor_found", "coverage_of", "unlike_training"})
+  for (const char* key : {"interval", "coverage", "interval_found", "coverage_of", "unlike_training"})
     EXPECT_TRUE(json["trust"].contains(key)) << key;
   const SafetensorsFile outputs = SafetensorsFile::read(path("outputs.safetensors"));
   EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<std::uint64_t>{40, 32, 16}));

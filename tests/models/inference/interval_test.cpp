@@ -9,58 +9,81 @@
 namespace supertac {
 namespace {
 
-const IntervalFactors kRising{{1, 2, 3, 4, 5}};
+const float kNaN = std::nanf("");
 
-TEST(IntervalFactors, DependOnThePicture) {
-  const float pictures[] = {0.0F, -0.019F, 0.02F, 0.1F, -0.3F, 0.5F, 2.0F}, factors[] = {1, 1, 2, 3, 4, 5, 5};
-  for (std::size_t i = 0; i < std::size(pictures); ++i)
-    EXPECT_FLOAT_EQ(kRising.half_width(pictures[i], 0.1F), factors[i] * 0.1F) << pictures[i];
-  EXPECT_FLOAT_EQ(kRising.half_width(1, -3), 0.05F) << "no predicted error is below .01";
-  std::vector<float> widths(7);
-  kRising.half_widths(pictures, {}, widths);
+TEST(PixelInterval, GrowsWithTheSlopeAndThePredictedError) {
+  const std::vector<float> picture = {0, 0, 0, 0,  //
+                                      0, 0, 1, 0,  //
+                                      0, 0, 0, 0.5F};
+  const std::vector<float> errors(12, 0.1F);
+  std::vector<float> widths;
+  PixelInterval{0.5, 2}.half_widths(picture, 4, errors, widths);
+  const float expected[] = {0.2F, 0.7F, 0.7F, 0.7F, 0.2F, 0.7F, 0.7F, 0.7F, 0.2F, 0.7F, 0.7F, 0.45F};
+  ASSERT_EQ(widths.size(), 12U);
+  for (std::size_t i = 0; i < 12; ++i) EXPECT_FLOAT_EQ(widths[i], expected[i]) << i;
+  PixelInterval{0, 5}.half_widths(picture, 4, std::vector<float>(12, -3.0F), widths);
+  EXPECT_FLOAT_EQ(widths[6], 0.05F) << "no predicted error is below .01";
+  PixelInterval{}.half_widths(picture, 4, {}, widths);
   EXPECT_TRUE(widths.empty());
-  EXPECT_TRUE(std::isnan(kRising.half_width(NAN, NAN)));
 }
 
-TEST(IntervalFactors, AreOneNumberOrFive) {
-  EXPECT_EQ(kRising.text(), "1,2,3,4,5");
-  EXPECT_EQ(IntervalFactors::read("1,2,3,4,5"), kRising);
-  EXPECT_EQ(IntervalFactors::read("1.45")->text(), "1.45") << "what older model files say";
-  for (const char* wrong : {"", "1,2", "1,2,3,4,x", "0,1,1,1,1", "101", "nan"})
-    EXPECT_FALSE(IntervalFactors::read(wrong)) << wrong;
+TEST(PixelInterval, LeavesOutWhatIsNotKnown) {
+  std::vector<float> errors = {0.1F, kNaN, 0.1F, 0.1F};
+  const std::vector<float> picture = {1, kNaN, 0.8F, 1};
+  PixelInterval{1, 1}.half_widths(picture, 2, errors, errors);  // in place
+  EXPECT_FLOAT_EQ(errors[0], 0.3F);
+  EXPECT_TRUE(std::isnan(errors[1]));
+  EXPECT_FLOAT_EQ(errors[3], 0.3F);
 }
 
-// Errors of 0.1, 0.2 .. 1 where 0.1 was predicted: ratios 1 .. 10, and a factor of 9 covers nine of ten.
-TEST(IntervalCoverage, FindsTheFactorOfEachLevel) {
-  std::vector<float> truth(20), picture(20, 0.0F), predicted(20, 0.1F);
-  for (std::size_t i = 0; i < 10; ++i) truth[i] = 0.1F * static_cast<float>(i) + 0.097F;
-  for (std::size_t i = 10; i < 20; ++i) {  // of the highest level, a tenth as far off
-    picture[i] = 1;
-    truth[i] = 1 + 0.01F * static_cast<float>(i - 10) + 0.0097F;
-  }
-  IntervalCoverage coverage(IntervalFactors{{5, 5, 5, 5, 5}});
+TEST(PixelInterval, IsReadAsItIsWritten) {
+  EXPECT_EQ((PixelInterval{0.5, 3}).text(), "0.5,3");
+  EXPECT_EQ(PixelInterval::read("0.5,3"), (PixelInterval{0.5, 3}));
+  EXPECT_EQ(PixelInterval::read("1.45"), (PixelInterval{0, 1.45})) << "what older model files say";
+  EXPECT_EQ(PixelInterval::read("1.45")->text(), "1.45");
+  for (const char* wrong : {"", "1,2,3", "1,x", "-1,1", "1,0", "101", "nan"})
+    EXPECT_FALSE(PixelInterval::read(wrong)) << wrong;
+}
+
+// Errors of 0.1, 0.2 .. 1 where 0.1 was predicted: a factor of 9 covers nine of ten, and in a class a tenth
+// as far off one of .9; the larger one is for all.
+TEST(IntervalCoverage, FindsTheFactorThatHoldsEachHeight) {
+  std::vector<float> truth(20, 0.0F), picture(20), predicted(20, 0.1F);
+  for (std::size_t i = 0; i < 10; ++i) picture[i] = 0.1F * static_cast<float>(i) + 0.097F;
+  for (std::size_t i = 10; i < 20; ++i)
+    picture[i] = 1, truth[i] = 1 + 0.01F * static_cast<float>(i - 10) + 0.0097F;
+  IntervalCoverage coverage(PixelInterval{0, 5});
   EXPECT_TRUE(coverage.empty());
-  coverage.add(3, picture, truth, predicted);
+  coverage.add(3, picture, 20, truth, predicted);
   EXPECT_DOUBLE_EQ(coverage.share(), 0.75);
-  EXPECT_EQ(coverage.factors(), (IntervalFactors{{9, 9, 9, 9, 0.9}}))
-      << "levels without pixels: as beside them";
-  EXPECT_DOUBLE_EQ(coverage.of_level(0).share, 0.5);
-  EXPECT_DOUBLE_EQ(coverage.of_level(4).share, 1);
-  EXPECT_NEAR(coverage.of_level(4).half_width, 0.5, 1e-6);
-  EXPECT_DOUBLE_EQ(coverage.of_height(0).pixels, 0);
-  EXPECT_DOUBLE_EQ(coverage.of_height(1).share, 1) << "0.097 and 0.197";
-  EXPECT_DOUBLE_EQ(coverage.of_height(2).pixels, 3);
-  EXPECT_DOUBLE_EQ(coverage.of_height(3).pixels, 15);
+  EXPECT_EQ(coverage.found(), (PixelInterval{0, 9}));
+  EXPECT_DOUBLE_EQ(coverage.of_height(0).share, 0.5);
+  EXPECT_DOUBLE_EQ(coverage.of_height(3).share, 1);
+  EXPECT_NEAR(coverage.of_height(3).half_width, 0.5, 1e-6);
+  EXPECT_DOUBLE_EQ(coverage.of_height(1).pixels, 0);
+}
+
+// A step of 1 that stands a pixel beside the truth is held by a shift of one pixel, whatever was predicted.
+TEST(IntervalCoverage, AShiftHoldsWhatStandsBeside) {
+  std::vector<float> truth(256, 0.0F), picture(256, 0.0F), predicted(256, 0.0F);
+  for (std::size_t i = 0; i < 256; ++i) truth[i] = i % 16 >= 8 ? 1 : 0, picture[i] = i % 16 >= 9 ? 1 : 0;
+  IntervalCoverage still(PixelInterval{0, 1}), shifted(PixelInterval{1, 1});
+  still.add(0, picture, 16, truth, predicted);
+  shifted.add(0, picture, 16, truth, predicted);
+  EXPECT_DOUBLE_EQ(still.of_height(3).share, 7.0 / 8);
+  EXPECT_EQ(still.found().factor, 20);
+  EXPECT_DOUBLE_EQ(shifted.share(), 1);
+  EXPECT_EQ(shifted.found(), (PixelInterval{1, 0.05}));
 }
 
 // A long pass that is all right and a short one that is not: each is half of the mean.
 TEST(IntervalCoverage, PassesCountTheSame) {
   const std::vector<float> right(30, 0.0F), wrong(30, 0.5F), predicted(30, 0.001F);
-  IntervalCoverage coverage(IntervalFactors{{1, 1, 1, 1, 1}});
-  for (int i = 0; i < 9; ++i) coverage.add(0, right, right, predicted);
-  coverage.add(1, right, wrong, predicted);
+  IntervalCoverage coverage(PixelInterval{0, 1});
+  for (int i = 0; i < 9; ++i) coverage.add(0, right, 30, right, predicted);
+  coverage.add(1, wrong, 30, right, predicted);
   EXPECT_DOUBLE_EQ(coverage.share(), 0.5);
-  EXPECT_EQ(coverage.factors().of_level[0], 20) << "50 least predicted errors are beyond the last bin";
+  EXPECT_EQ(coverage.found().factor, 20) << "50 least predicted errors are beyond the last bin";
 }
 
 }  // namespace

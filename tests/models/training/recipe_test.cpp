@@ -28,7 +28,7 @@ TEST(Recipe, ComesBackFromTheModelFile) {
     recipe.loss.lambda = 0.25;
     recipe.plates = {"3_Bumps", "4_Ridges"}, recipe.leave_out = {"4_Ridges"};
     recipe.split = SplitKind::texture;
-    recipe.stride = 4, recipe.random_plates = 9, recipe.interval_factor = IntervalFactors{{1, 2, 3, 4, 5}};
+    recipe.stride = 4, recipe.random_plates = 9, recipe.interval_factor = PixelInterval{0.5, 3};
     recipe.range = Scaling{.rest_volts = 2, .span_volts = 0.5};
     recipe.augment.dropped = 1, recipe.mirror = true;
     const std::string path = folder / (std::string(name) + ".safetensors");
