@@ -111,7 +111,7 @@ class TrustScores {
  public:
   /// `model`: whose interval and novelty are judged; must outlive this, as the windows.
   TrustScores(const WindowSet& windows, const ModelFile& model)
-      : windows_(windows), model_(model), coverage_(model.interval_factors()) {}
+      : windows_(windows), model_(model), coverage_(model.interval()) {}
   /// Windows of a pass come in the order of time. Without a predicted error nothing is counted of it.
   void add(const Drawn& drawn);
 

@@ -32,7 +32,7 @@ class Scene {
   static constexpr double kSeconds = 1.2;
   /// Which objects: of one of press_kinds(), from the smallest (0) to the largest (1).
   struct Objects {
-    std::string kind;
+    std::string kind = {};
     double smallest = 0, largest = 1;
   };
   Scene(const Objects& objects, const TaxelArray& array, const RandomStream& random);
