@@ -32,8 +32,8 @@ struct PixelInterval {
   void half_widths(std::span<const float> picture, std::size_t width, std::span<const float> predicted_error,
                    std::vector<float>& widths) const;
 
-  /// "0.75,0.55", or "1.45" for a factor without a shift, as older files have it; back from it, or nothing for
-  /// another text, a shift outside 0 to 10 or a factor outside 0.05 to 100.
+  /// "0.75,0.55", or "1.45" for a factor without a shift, as older files have it; back from it, or nothing
+  /// for another text, a shift outside 0 to 10 or a factor outside 0.05 to 100.
   std::string text() const;
   static std::optional<PixelInterval> read(const std::string& text);
   bool operator==(const PixelInterval&) const = default;
