@@ -7,6 +7,7 @@
 #include "apps/common/output/output_folder.h"
 #include "data/recordings/mcap_log.h"
 #include "data/recordings/recording.h"
+#include "data/recordings/signals_tensor.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 #include "models/files/chain.h"
@@ -82,7 +83,7 @@ int export_mcap(Arguments& arguments, const SafetensorsFile& file) {
                       std::string("tensor ") + name + " does not fit the others; stream it again");
     return file.f32(name);
   };
-  const std::vector<float> volts = values("volts", {n, signals});
+  const std::vector<float> volts = values(signals_tensor(file), {n, signals});
   std::vector<float> pictures, half_widths;
   ImageGrid image{0, 0};
   if (drawn && file.tensors().contains("pictures")) {

@@ -69,7 +69,7 @@ void declare(Arguments& a) {
       .option("recording", "FILE", "a recording instead of a board")
       .option("seconds", "N", "end after N seconds of signal; default: when the source ends, or at Ctrl-C")
       .option("out", "FILE",
-              "keep time, voltages and picture of every frame (safetensors, 2.2 MB/s at 16x16); '-': a line "
+              "keep time, signals and picture of every frame (safetensors, 2.2 MB/s at 16x16); '-': a line "
               "of JSON for each on stdout")
       .writes()
       .option("mcap", "FILE",

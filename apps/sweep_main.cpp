@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <set>
 #include <span>
 
 #include "apps/common/command_line/program.h"
@@ -61,11 +62,35 @@ constexpr Axis kAxes[] = {{"timesteps", &SuperTacSettings::timesteps, "_t"},
                           {"channels", &SuperTacSettings::channels, "_c"},
                           {"rcabs", &SuperTacSettings::rcabs, "_r"}};
 
-// "paper_t256_l10_x4_c32_r3_s0": all but the last part is the same for all seeds.
+// "paper_t256_l10_x4_c32_r3_s0", and what was left out: all before "_s0" is the same for all seeds.
 std::string model_name_of(const Recipe& recipe) {
   std::string name = recipe.model.preset;
   for (const Axis& axis : kAxes) name += axis.letter + std::to_string(recipe.model.*axis.setting);
-  return name + "_s" + std::to_string(recipe.seed);
+  name += "_s" + std::to_string(recipe.seed);
+  for (const std::string& one : recipe.leave_out) name += "_" + one;
+  for (char& c : name)
+    if (std::string_view(",/\"\\\n").find(c) != std::string_view::npos) c = '-';
+  return name;
+}
+// Where "_s0" begins.
+std::size_t seed_in(const std::string& model) {
+  std::size_t at = model.find("_s");
+  while (at != std::string::npos && (at + 2 >= model.size() || model[at + 2] < '0' || model[at + 2] > '9'))
+    at = model.find("_s", at + 1);
+  return std::min(at, model.size());
+}
+
+// What can be left out of the recordings, each once: their groups, or their plates.
+std::vector<std::string> each_of(const Arguments& a, SplitKind split) {
+  if (split != SplitKind::group && split != SplitKind::texture)
+    throw UsageError("--leave-out each: only with --split group or texture");
+  std::set<std::string> names;
+  for (const std::string& path : list_recordings(a.text("data")))
+    names.insert(
+        value_or(SafetensorsFile::read(path).metadata(), split == SplitKind::group ? "group" : "plate"));
+  if (names.erase("") > 0)
+    throw UsageError("--leave-out each: a recording in " + a.text("data") + " names no group");
+  return {names.begin(), names.end()};
 }
 
 std::vector<Dim> whole_numbers(const Arguments& a, const std::string& name) {
@@ -94,8 +119,14 @@ std::vector<Recipe> grid_of(const Arguments& a) {
   std::vector<Recipe> all;
   for (Recipe& recipe : grid) {
     as_usage([&] { recipe.check(); });
-    for (const Dim seed : whole_numbers(a, "seeds"))
-      recipe.seed = static_cast<std::uint64_t>(seed), all.push_back(recipe);
+    std::vector<std::vector<std::string>> leave_out = {recipe.leave_out};
+    if (recipe.leave_out == std::vector<std::string>{"each"}) {
+      leave_out.clear();
+      for (const std::string& one : each_of(a, recipe.split)) leave_out.push_back({one});
+    }
+    for (const std::vector<std::string>& left_out : leave_out)
+      for (const Dim seed : whole_numbers(a, "seeds"))
+        recipe.seed = static_cast<std::uint64_t>(seed), recipe.leave_out = left_out, all.push_back(recipe);
   }
   if (all.empty()) throw UsageError("the grid is empty: give --preset and --seeds at least one value");
   return all;
@@ -122,7 +153,8 @@ void check_settings(const Arguments& a) {
 
 // sweep.csv: one row for each model.
 constexpr const char* kColumns =
-    "model,preset,timesteps,latent,scale,channels,rcabs,seed,split,windows,ssim,psnr_db,phase,phase_floor,"
+    "model,preset,timesteps,latent,scale,channels,rcabs,seed,split,left_out,windows,ssim,psnr_db,phase,phase_"
+    "floor,"
     "position_mm,all_windows,all_ssim,all_psnr_db,all_phase,all_phase_floor,all_position_mm,median_us,p99_us,"
     "mmac,parameters,train_s,steps,commit";
 
@@ -195,6 +227,7 @@ Json row_of(const Recipe& recipe, const TrainingRun& training, const ZoneMetrics
   for (const Axis& axis : kAxes) row[axis.name] = s.*axis.setting;
   row["seed"] = recipe.seed;
   row["split"] = name_of(recipe.split);
+  row["left_out"] = joined(recipe.leave_out, " ");
   for (const auto& [prefix, m] :
        {std::pair<std::string, Metrics>{"", scores.contact()}, {"all_", scores.all()}}) {
     row[prefix + "windows"] = m.windows;
@@ -234,7 +267,7 @@ Json measure(const Arguments& a, const Recipe& recipe, const std::string& label)
   return row;
 }
 
-// The means over the seeds of one configuration.
+// The means over the seeds of one configuration, and over what was left out.
 struct Configuration {
   std::string name;
   std::size_t seeds = 0;
@@ -246,7 +279,7 @@ struct Configuration {
 std::vector<Configuration> configurations(const Table& table) {
   std::vector<Configuration> all;
   const auto of = [&](const std::string& model) -> Configuration& {
-    const std::string name = model.substr(0, model.rfind("_s"));
+    const std::string name = model.substr(0, seed_in(model));
     const auto found = std::ranges::find(all, name, &Configuration::name);
     return found != all.end() ? *found : all.emplace_back(name);
   };
@@ -262,8 +295,19 @@ std::vector<Configuration> configurations(const Table& table) {
   return all;
 }
 
+// Models of which something was left out and tested, the worst first; empty where nothing was.
+std::vector<std::pair<double, std::string>> left_out_models(const Table& table) {
+  std::vector<std::pair<double, std::string>> models;
+  table.each("ssim", [&](const std::string& model, double value) {
+    if (model.find('_', std::min(model.size(), seed_in(model) + 1)) != std::string::npos)
+      models.emplace_back(value, model);
+  });
+  std::ranges::sort(models);
+  return models;
+}
+
 // Points are labelled by the numbers of the table below.
-std::string page_of(const std::vector<Configuration>& all, const Arguments& a) {
+std::string page_of(const std::vector<Configuration>& all, const Table& table, const Arguments& a) {
   ChartSeries front{.name = "Pareto front", .points = {}, .line = true, .dots = true};
   ChartSeries others{.name = "dominated", .points = {}, .line = false, .dots = true};
   std::string rows;
@@ -276,15 +320,22 @@ std::string page_of(const std::vector<Configuration>& all, const Arguments& a) {
             "&ensp;" + escaped(c.name) + "</td><td>" + std::to_string(c.seeds) + "</td><td>" +
             format(c.median_us, 1) + "</td><td>" + format(c.ssim, 3) + "</td></tr>";
   }
+  std::string left_out;
+  for (const auto& [ssim, model] : left_out_models(table))
+    left_out += "<tr><td>" + escaped(model) + "</td><td>" + format(ssim, 3) + "</td></tr>";
+  if (!left_out.empty())
+    left_out = page_section("Each left out in turn", "the worst first: tested on what it has not seen",
+                            page_table({"model, and what it has not seen", "contact SSIM"}, left_out));
   return result_page(
       "SuperTac sweep",
       page_section(
           "Accuracy against the time of a picture",
-          "processor time at batch 1 on one thread; SSIM of contact windows, mean over seeds; bold: of the "
+          "processor time at batch 1 on one thread; SSIM of contact windows, mean over models; bold: of the "
           "Pareto front, no other is both faster and more accurate",
           chart_svg("Contact SSIM", {.label = "one picture, us", .logarithmic = true},
                     {.label = "SSIM", .most = 1}, {front, others}) +
-              page_table({"configuration", "seeds", "one picture, us", "contact SSIM"}, rows)) +
+              page_table({"configuration", "models", "one picture, us", "contact SSIM"}, rows)) +
+          left_out +
           page_section("What made this page", "",
                        page_facts({{"command", a.command_line()}, {"commit", commit()}})));
 }
@@ -305,15 +356,21 @@ int run(Arguments& a) {
           measure(a, grid[i], std::to_string(i + 1) + " of " + std::to_string(grid.size()) + " " + name));
   }
   const std::vector<Configuration> all = configurations(table);
-  write_file(out + "/chart.html", page_of(all, a));
+  write_file(out + "/chart.html", page_of(all, table, a));
   a.print("Pareto front, fastest first:");
   Json result = {{"configurations", all.size()}};
   for (const Configuration& c : all) {
     if (!c.on_front) continue;
     a.print("  " + c.name + ": SSIM " + format(c.ssim, 3) + ", " + format(c.median_us, 1) + " us, " +
-            std::to_string(c.seeds) + " seed(s)");
+            std::to_string(c.seeds) + " model(s)");
     result["front"].push_back(
         {{"configuration", c.name}, {"seeds", c.seeds}, {"ssim", c.ssim}, {"median_us", c.median_us}});
+  }
+  const auto left_out = left_out_models(table);
+  if (!left_out.empty()) a.print("Each left out in turn, the worst first:");
+  for (const auto& [ssim, model] : left_out) {
+    a.print("  " + model + ": SSIM " + format(ssim, 3));
+    result["left_out"].push_back({{"model", model}, {"ssim", ssim}});
   }
   a.write_json(result);
   return kExitOk;

@@ -29,8 +29,8 @@ Picture figure(const std::vector<ShownWindow>& shown, std::span<const std::uint3
   const ImageGrid image = windows.image();
   Captions captions{.title = title + "; a picture is " + format(image.width_mm()) + " x " +
                              format(image.height_mm()) + " mm",
-                    .low = "0: flat plate, not pressed",
-                    .high = "1: plate's highest, pressed hard"};
+                    .low = "0: nothing, not pressed",
+                    .high = "1: the highest, pressed hard"};
   const auto middle = [](int pixels, int of, int i) { return pixels * (2 * i + 1) / (2 * of); };
   for (int i = 0; i < parts; ++i)
     (down ? captions.columns : captions.rows)

@@ -15,6 +15,7 @@ namespace supertac {
 namespace {
 
 constexpr double kApartMm = 3;
+constexpr std::uint32_t kApartFrames = 20;
 constexpr float kTexture = 0.1F;
 constexpr int kPanel = 64;  // pixels of a PNG's longer side
 
@@ -99,6 +100,7 @@ std::string by_height(const nlohmann::ordered_json& trust) {
 }
 
 std::string by_distance(const nlohmann::ordered_json& parts) {
+  if (parts.empty()) return "";  // nothing slid
   ChartSeries series{.name = "network", .points = {}, .dots = true};
   for (const auto& part : parts) {
     series.points.emplace_back(part["from_mm"].get<double>(), part["ssim"].get<double>());
@@ -118,14 +120,14 @@ std::string png_of(std::span<const float> values, int rows, int columns) {
   return picture_address(picture);
 }
 
-const char* word_of(Zone zone) {
+const char* word_of(Zone zone, bool measured) {
   switch (zone) {
     case Zone::contact:
       return "in contact";
     case Zone::near:
-      return "near texture";
+      return measured ? "beside contact" : "near texture";
     case Zone::flat:
-      return "flat plate";
+      return measured ? "at rest" : "flat plate";
     case Zone::air:
       return "in the air";
   }
@@ -139,17 +141,22 @@ void EvaluationPage::add(const Drawn& d, double ssim) {
   contact_.push_back({ssim, d.example, 4 * static_cast<std::size_t>(texture) >= d.target.size()});
 }
 
-std::vector<EvaluationPage::ScoredWindow> EvaluationPage::extremes(bool best) const {
-  std::vector<ScoredWindow> sorted = contact_, chosen;
+std::vector<EvaluationPage::ScoredWindow> EvaluationPage::extremes(bool best, const std::string& group,
+                                                                   std::size_t most) const {
+  std::vector<ScoredWindow> sorted, chosen;
+  for (const ScoredWindow& one : contact_)
+    if (group.empty() || group_of(one.window) == group) sorted.push_back(one);
   std::sort(sorted.begin(), sorted.end(), [&](const ScoredWindow& a, const ScoredWindow& b) {
     return std::pair(best ? -a.ssim : a.ssim, a.window) < std::pair(best ? -b.ssim : b.ssim, b.window);
   });
   const auto near = [&](const ScoredWindow& a, const ScoredWindow& b) {
     return windows_.pass_of(a.window) == windows_.pass_of(b.window) &&
-           std::abs(windows_.position(a.window).y_mm - windows_.position(b.window).y_mm) < kApartMm;
+           (windows_.truth_is_measured(windows_.pass_of(a.window))
+                ? std::max(a.window, b.window) - std::min(a.window, b.window) < kApartFrames
+                : std::abs(windows_.position(a.window).y_mm - windows_.position(b.window).y_mm) < kApartMm);
   };
   for (const ScoredWindow& one : sorted) {
-    if (chosen.size() == kShown) break;
+    if (chosen.size() == most) break;
     if (best && !one.full) continue;  // the edge of a texture is drawn well too easily
     if (std::none_of(chosen.begin(), chosen.end(), [&](const ScoredWindow& c) { return near(c, one); }))
       chosen.push_back(one);
@@ -172,8 +179,14 @@ std::vector<std::uint32_t> EvaluationPage::film_frames(std::span<const std::uint
 
 std::string EvaluationPage::name_of(std::uint32_t window) const {
   const WindowSet::Pass& pass = windows_.passes()[windows_.pass_of(window)];
-  return pass.plate + ", trial " + std::to_string(pass.trial) + ", pass " + std::to_string(pass.pass) +
+  return (pass.group.empty() || pass.group == pass.plate ? "" : pass.group + ", ") + pass.plate + ", trial " +
+         std::to_string(pass.trial) + ", pass " + std::to_string(pass.pass) +
          (pass.speed_mm_s > 0 ? ", " + format(pass.speed_mm_s) + " mm/s" : "");
+}
+
+std::string EvaluationPage::group_of(std::uint32_t window) const {
+  const WindowSet::Pass& pass = windows_.passes()[windows_.pass_of(window)];
+  return pass.group.empty() ? pass.plate : pass.group;
 }
 
 std::string EvaluationPage::by_group(const nlohmann::ordered_json& groups) const {
@@ -231,10 +244,11 @@ std::string EvaluationPage::films(std::span<const std::uint32_t> frames,
     std::vector<float> all = p.felt;
     all.insert(all.end(), p.drawn.begin(), p.drawn.end());
     all.insert(all.end(), p.truth.begin(), p.truth.end());
-    passes.back()["frames"].push_back({{"place", windows_.place_text(window)},
-                                       {"zone", word_of(windows_.zone(window))},
-                                       {"ssim", ssim(p.drawn, p.truth, grid.height, grid.width)},
-                                       {"levels", levels_base64(all)}});
+    passes.back()["frames"].push_back(
+        {{"place", windows_.place_text(window)},
+         {"zone", word_of(windows_.zone(window), windows_.truth_is_measured(windows_.pass_of(window)))},
+         {"ssim", ssim(p.drawn, p.truth, grid.height, grid.width)},
+         {"levels", levels_base64(all)}});
   }
   const TaxelArray array = windows_.array();
   std::string text = dumped({{"map", colour_map_base64()},
@@ -250,9 +264,15 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
                                  const nlohmann::ordered_json& result,
                                  const std::vector<std::pair<std::string, std::string>>& made_by) const {
   const std::vector<ScoredWindow> best = extremes(true), worst = extremes(false);
+  std::vector<ScoredWindow> all_groups;
+  const std::size_t groups = result["groups"].size();
+  for (std::size_t i = 0; i < std::min(groups, kGroups) && groups > 1; ++i)
+    std::ranges::copy(extremes(false, result["groups"][i]["name"].get<std::string>(), kOfGroup),
+                      std::back_inserter(all_groups));
+  const std::vector<ScoredWindow>& of_groups = all_groups;
   const std::vector<std::uint32_t> frames = film_frames(test);
   std::vector<std::uint32_t> chosen = frames;
-  for (const std::vector<ScoredWindow>* some : {&best, &worst})
+  for (const std::vector<ScoredWindow>* some : {&best, &worst, &of_groups})
     for (const ScoredWindow& one : *some) chosen.push_back(one.window);
   std::sort(chosen.begin(), chosen.end());
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
@@ -264,11 +284,14 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
                         escaped(result["split"].get<std::string>()) + ", " +
                         std::to_string(result["all"]["windows"].get<long>()) + " windows, " +
                         std::to_string(result["contact"]["windows"].get<long>()) + " in contact</p>";
-  content +=
-      by_method(result) + "<div class=\"two\">" + by_group(result["groups"]) + by_zone(result) + "</div>" +
-      by_height(result["trust"]) + by_distance(result["felt"]) +
-      shown("The worst windows", "in contact, by SSIM; no two within 3 mm of one pass", worst, pictures) +
-      shown("The best windows", "of those with texture on a quarter of the picture", best, pictures);
+  content += by_method(result) + "<div class=\"two\">" + by_group(result["groups"]) + by_zone(result) +
+             "</div>" + by_height(result["trust"]) + by_distance(result["felt"]) +
+             (of_groups.empty() ? ""
+                                : shown("The worst of each", "the groups in the order of their scores",
+                                        of_groups, pictures)) +
+             shown("The worst windows", "in contact, by SSIM; no two within 3 mm of one pass, or 20 frames",
+                   worst, pictures) +
+             shown("The best windows", "of those with something on a quarter of the picture", best, pictures);
   content += page_section(
       "Films", "each pass of the test side; felt, drawn, true",
       "<div class=\"controls\"><select id=\"pass\" aria-label=\"pass\"></select><button "
@@ -279,7 +302,7 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
       "</canvas>drawn</figure><figure><canvas id=\"film-true\"></canvas>true</figure></div>"
       "<p class=\"quiet\" id=\"film-label\" role=\"status\"></p><canvas id=\"bar\" "
       "style=\"width:100%\"></canvas>"
-      "<p class=\"quiet ends\"><span>0: flat plate, not pressed</span><span>1: the plate's highest, "
+      "<p class=\"quiet ends\"><span>0: nothing, not pressed</span><span>1: the highest, "
       "pressed hard</span></p>");
   content += page_section("What made this page", "", page_facts(made_by));
   return result_page("SuperTac evaluation", content, films(frames, pictures));

@@ -16,8 +16,9 @@
 namespace supertac {
 
 /// Scores beside those of the baselines, by group or plate (the worst first), zone and distance since the
-/// first contact; the twelve worst windows in contact, and the twelve best of those with texture on a quarter
-/// of the picture, no two of them within 3 mm of one pass; a film of each pass; and what made it all.
+/// first contact; the three worst windows in contact of each of the eight worst groups; the twelve worst
+/// windows in contact, and the twelve best of those with texture on a quarter of the picture, no two of them
+/// within 3 mm of one pass; a film of each pass; and what made it all.
 class EvaluationPage {
  public:
   explicit EvaluationPage(const WindowSet& windows) : windows_(windows) {}
@@ -30,7 +31,7 @@ class EvaluationPage {
                    const nlohmann::ordered_json& result,
                    const std::vector<std::pair<std::string, std::string>>& made_by) const;
 
-  static constexpr std::size_t kShown = 12, kFilmFrames = 2400, kFramesOfPass = 80;
+  static constexpr std::size_t kShown = 12, kGroups = 8, kOfGroup = 3, kFilmFrames = 2400, kFramesOfPass = 80;
 
  private:
   struct ScoredWindow {
@@ -38,7 +39,10 @@ class EvaluationPage {
     std::uint32_t window;
     bool full;  ///< a quarter of the truth is texture
   };
-  std::vector<ScoredWindow> extremes(bool best) const;
+  /// Of all groups, or of one.
+  std::vector<ScoredWindow> extremes(bool best, const std::string& group = {},
+                                     std::size_t most = kShown) const;
+  std::string group_of(std::uint32_t window) const;
   std::vector<std::uint32_t> film_frames(std::span<const std::uint32_t> test) const;
   std::string by_group(const nlohmann::ordered_json& groups) const;
   std::string shown(const std::string& title, const std::string& note,

@@ -63,7 +63,7 @@ class DistanceScores {
 
 /// Mean SSIM and PSNR of windows in contact, by pass. Windows of one pass resemble each other, so the
 /// intervals are over passes, drawn anew within each plate: they say what other passes over these plates
-/// would give, of this one network.
+/// would give, of this one network; of one pass each, what other plates (or groups) would.
 class PassScores {
  public:
   explicit PassScores(const WindowSet& windows) : windows_(windows) {}

@@ -133,7 +133,7 @@ void PictureLog::write(std::map<std::string, std::string> metadata) {
     if (!times.empty())
       return write_safetensors(
           output_, metadata,
-          {{"time_s", "F64", {kept}, times, {}}, {"volts", "F32", {kept, format_.signals}, {}, rows}});
+          {{"time_s", "F64", {kept}, times, {}}, {format_.tensor, "F32", {kept, format_.signals}, {}, rows}});
   }
   const auto from = [this](const Spool& spool) {
     return [this, &spool](const ByteSink& sink) { read_back(spool, sink); };
@@ -141,7 +141,7 @@ void PictureLog::write(std::map<std::string, std::string> metadata) {
   const auto height = static_cast<std::uint64_t>(format_.image.height),
              width = static_cast<std::uint64_t>(format_.image.width);
   std::vector<TensorToWrite> tensors = {{"time_s", "F64", {count_}, {}, from(times_)},
-                                        {"volts", "F32", {count_, format_.signals}, {}, from(volts_)}};
+                                        {format_.tensor, "F32", {count_, format_.signals}, {}, from(volts_)}};
   if (pictures_) tensors.push_back({"pictures", "F32", {count_, height, width}, {}, from(pictures_)});
   if (half_widths_)
     tensors.push_back({"half_widths", "F32", {count_, height, width}, {}, from(half_widths_)});

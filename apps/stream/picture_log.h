@@ -13,15 +13,14 @@
 namespace supertac {
 
 /// Keeps the signals of a stream, or its pictures, for a safetensors file. Signals alone make a recording
-/// (data/recordings/recording.h): time_s and volts. With pictures it has tensors time_s F64 [n], volts F32
-/// [n,signals] and pictures F32 [n,height,width]; of a model that says how sure it is also half_widths F32
-/// [n,height,width], of its pixels' 90 % intervals, and distances F32 [n] from its training. Metadata
-/// "began_s" is the wall-clock time of time_s 0 (s since 1970), where it is known. How many there will be is
-/// not known before the end, and they do not fit into memory (1 MB/s): they wait in nameless temporary files
-/// beside the final one.
-/// A recording of a board is dated at its end, by the clock that collections have
-/// (hardware/boards/frame_clock.h); frames whose time is uncertain by more than kTrustedS, because the host
-/// or the board stood still, are left out, and metadata left_out_frames counts them.
+/// (data/recordings/recording.h): time_s and signals. With pictures it has tensors time_s F64 [n], signals
+/// (or volts) F32 [n,signals] and pictures F32 [n,height,width]; of a model that says how sure it is also
+/// half_widths F32 [n,height,width], of its pixels' 90 % intervals, and distances F32 [n] from its training.
+/// Metadata "began_s" is the wall-clock time of time_s 0 (s since 1970), where it is known. How many there
+/// will be is not known before the end, and they do not fit into memory (1 MB/s): they wait in nameless
+/// temporary files beside the final one. A recording of a board is dated at its end, by the clock that
+/// collections have (hardware/boards/frame_clock.h); frames whose time is uncertain by more than kTrustedS,
+/// because the host or the board stood still, are left out, and metadata left_out_frames counts them.
 class PictureLog {
  public:
   /// Throws FileError when the file cannot be made there, or exists and is not to be replaced.

@@ -16,6 +16,7 @@ struct PictureFormat {
   std::size_t signals = 0;  ///< in a frame
   ImageGrid image;
   bool half_widths = false, distance = false;  ///< whether the model says how sure it is
+  const char* tensor = "volts";                ///< that holds the signals (signals_tensor)
 };
 
 /// One picture of a stream and what belongs to it, valid until the next.

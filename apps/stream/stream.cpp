@@ -11,6 +11,7 @@
 
 #include "apps/common/running/signals.h"
 #include "data/plates/plate_file.h"
+#include "data/recordings/signals_tensor.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
@@ -40,8 +41,10 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   state_.array = source.array();
   state_.scale = maker_ ? maker_->image().height / state_.array.rows : 1;
   state_.unit = source.signal_scale().unit, state_.draws = maker_ != nullptr;
-  const PictureFormat signals{.signals = source.array().signals(), .image = {0, 0}};
-  const PictureFormat format = maker_ ? maker_->format() : signals;
+  const char* const tensor = signals_tensor(source.signal_scale());
+  const PictureFormat signals{.signals = source.array().signals(), .image = {0, 0}, .tensor = tensor};
+  PictureFormat format = maker_ ? maker_->format() : signals;
+  format.tensor = tensor;
   describe_recording();
   settings_.metadata.merge(metadata_of(source.array(), source.signal_scale()));
   if (maker_) settings_.metadata["pixel_mm"] = json_of(maker_->image().pixel_mm).dump();

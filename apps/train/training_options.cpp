@@ -45,17 +45,16 @@ void declare_window_training(Arguments& a) {
   a.option(
       "leave-out", "A,B,...",
       "with --split texture the plates, with --split group the groups that are tested (default: drawn with "
-      "the seed)");
+      "the seed); of supertac-sweep also each: all in turn, a row for each");
   a.more();
   a.option(
       "rate", "HZ",
       "of the model's samples: T samples span T / HZ seconds; the paper's is 300, and the board's filter "
       "leaves nothing above 10 (default: 100; preset tiny: 50)");
-  a.option(
-      "range", "REST,SPAN",
-      "a signal V becomes clip((REST - V) / SPAN, 0, 1), in volts or whatever the recordings hold; auto: "
-      "the rig's 2.45,0.36, or where it does not fit what the recordings show",
-      "auto");
+  a.option("range", "REST,SPAN",
+           "a signal V becomes clip((REST - V) / SPAN, 0, 1), in the unit of the recordings; auto: "
+           "the rig's 2.45,0.36, or where it does not fit what the recordings show",
+           "auto");
   a.option(
       "scaling", "NAME",
       "of the signals: per-window (each window to its own rest and gain, so that a finger pressed harder "

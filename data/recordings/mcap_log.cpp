@@ -116,7 +116,7 @@ std::vector<McapChannel> channels_of(const TaxelArray& array, const std::string&
                         {"array", array.text()},
                         {"pixel_mm", (picture && drawn ? image.pixel_mm : array.pitch_mm).text()}}};
   };
-  const std::string heights = "1: the plate's highest point";
+  const std::string heights = "1: the highest of the truth";
   std::vector<McapChannel> channels = {channel("taxels", false, unit),
                                        channel("picture", true, drawn ? heights : unit)};
   const std::string loads = "1: a taxel at the end of its range";

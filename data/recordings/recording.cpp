@@ -9,6 +9,7 @@
 #include <span>
 #include <stdexcept>
 
+#include "data/recordings/signals_tensor.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/files/provenance.h"
@@ -24,7 +25,7 @@ constexpr char kKind[] = "recording";
 // What no rig does; a model file has the same limit for its filter.
 constexpr double kFastest = 1e4, kLongestFilter = 10, kLongest = 1e10;
 constexpr int kMostTruthPixels = 1024;
-constexpr const char* kTensors[] = {"time_s", "volts", "position_mm", "lift_mm", "truth"};
+constexpr const char* kTensors[] = {"time_s", "volts", "signals", "position_mm", "lift_mm", "truth"};
 constexpr const char* kFields[] = {"kind",   "plate", "trial",   "pass", "speed_mm_s",
                                    "source", "array", "signals", "body"};
 
@@ -53,7 +54,7 @@ std::optional<std::string> problem_of(const Recording& recording) {
            std::to_string(expected) + " for " + std::to_string(n) + " frames";
   };
   const std::size_t signals = recording.array.signals();
-  if (recording.volts.size() != n * signals) return sizes("volts", recording.volts.size(), n * signals);
+  if (recording.volts.size() != n * signals) return sizes("signals", recording.volts.size(), n * signals);
   if (!recording.position_mm.empty() && recording.position_mm.size() != n * 2) {
     return sizes("position_mm", recording.position_mm.size(), n * 2);
   }
@@ -69,7 +70,7 @@ std::optional<std::string> problem_of(const Recording& recording) {
   const auto volt = std::find_if_not(recording.volts.begin(), recording.volts.end(), finite);
   if (volt != recording.volts.end()) {
     const auto index = volt - recording.volts.begin();
-    return "volts are not finite at frame " + std::to_string(static_cast<std::size_t>(index) / signals) +
+    return "signals are not finite at frame " + std::to_string(static_cast<std::size_t>(index) / signals) +
            ", taxel " +
            std::to_string(static_cast<int>(static_cast<std::size_t>(index) % signals) /
                           recording.array.channels);
@@ -165,15 +166,18 @@ Recording recording_of(const SafetensorsFile& file) {
   recording.metadata.erase("array"), recording.metadata.erase("signals");
 
   for (const auto& [name, tensor] : file.tensors())
-    if (std::ranges::find(kTensors, name) == std::end(kTensors))
-      throw FileError(path, "holds a tensor " + in_quotes(name) +
-                                ", which nobody reads; expected time_s, volts and, where known, position_mm, "
-                                "lift_mm and truth: rename it or leave it out");
+    if (std::ranges::find(kTensors, name) == std::end(kTensors) ||
+        (name == "volts" && name != signals_tensor(file)))
+      throw FileError(
+          path,
+          "holds a tensor " + in_quotes(name) +
+              ", which nobody reads; expected time_s, signals (or volts) and, where known, position_mm, "
+              "lift_mm and truth: rename it or leave it out");
   recording.time_s = file.f64("time_s");
-  recording.volts = file.f32("volts");
+  recording.volts = file.f32(signals_tensor(file));
   const std::uint64_t n = recording.frames();
   check_shape(file, "time_s", {n});
-  check_shape(file, "volts", {n, recording.array.signals()});
+  check_shape(file, signals_tensor(file), {n, recording.array.signals()});
   if (file.tensors().contains("position_mm")) {
     recording.position_mm = file.f32("position_mm");
     check_shape(file, "position_mm", {n, 2});
@@ -199,9 +203,11 @@ void write_recording(const std::string& path, const Recording& recording) {
   if (const auto problem = problem_of(recording)) throw std::invalid_argument("write_recording: " + *problem);
   recording.array.check();
   const std::uint64_t n = recording.frames();
-  std::vector<TensorToWrite> tensors = {
-      {"time_s", "F64", {n}, std::as_bytes(std::span(recording.time_s))},
-      {"volts", "F32", {n, recording.array.signals()}, std::as_bytes(std::span(recording.volts))}};
+  std::vector<TensorToWrite> tensors = {{"time_s", "F64", {n}, std::as_bytes(std::span(recording.time_s))},
+                                        {signals_tensor(recording.signal_scale),
+                                         "F32",
+                                         {n, recording.array.signals()},
+                                         std::as_bytes(std::span(recording.volts))}};
   if (!recording.position_mm.empty()) {
     tensors.push_back({"position_mm", "F32", {n, 2}, std::as_bytes(std::span(recording.position_mm))});
   }

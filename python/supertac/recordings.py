@@ -59,6 +59,11 @@ SHAPES: dict[str, list[Any]] = {"time_s": ["n"], "volts": ["n", None], "position
                            "truth?": ["n", None, None]}
 
 
+def _named(tensors: dict[str, Array]) -> dict[str, Array]:
+    """The signals of a sensor that does not give volts are the tensor `signals`."""
+    return {"volts" if name == "signals" else name: values for name, values in tensors.items()}
+
+
 def _check(path: Path, recording: Recording) -> None:
     array, times, volts = recording.array, recording.time_s, recording.volts
     pitch = array.get("pitch_mm") if isinstance(array, dict) else None  # or [along a row, from row to row]
@@ -92,7 +97,7 @@ def read_recording(path: Path) -> Recording:
     if metadata.get("kind") != "recording":
         raise ValueError(f"{path}: expected a recording, found a {metadata.get('kind', 'file of another kind')}")
     array = parse_json(path, metadata["array"]) if "array" in metadata else dict(RIG)
-    times, volts, position, lift, truth = expect(path, tensors, SHAPES)
+    times, volts, position, lift, truth = expect(path, _named(tensors), SHAPES)
     recording = Recording(times, volts, position, array, metadata, lift, truth)
     _check(path, recording)
     return recording
@@ -129,7 +134,7 @@ def read_pictures(path: Path) -> Log:
         raise ValueError(f"{path}: expected the pictures of supertac-stream --out, found {sorted(tensors)}")
     picture = ["n", "height", "width"]
     times, volts, pictures, half_widths, distances = expect(
-        path, tensors, {"time_s": ["n"], "volts": ["n", None], "pictures": picture, "half_widths?": picture,
+        path, _named(tensors), {"time_s": ["n"], "volts": ["n", None], "pictures": picture, "half_widths?": picture,
                         "distances?": ["n"]})
     return Log(times, volts, pictures, half_widths, distances, metadata)
 

@@ -81,7 +81,7 @@ def check_pictures(path, log, array, pixel_mm, began_s):
             stamps = [m.header.stamp.sec + m.header.stamp.nanosec / 1e9 for m in messages]
             assert np.abs(stamps - logged).max() < 1e-6
             assert channel.metadata["pixel_mm"] == pixel_mm
-        assert channel.metadata["unit"] == ("V" if topic == "/supertac/taxels" else "1: the plate's highest point")
+        assert channel.metadata["unit"] == ("V" if topic == "/supertac/taxels" else "1: the highest of the truth")
         assert np.array_equal(np.array(drawn, np.float32), kept), topic
     print(f"{path.name}: {len(log.time_s)} of each topic, the same bits")
 

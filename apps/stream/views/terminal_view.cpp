@@ -145,8 +145,8 @@ std::string render(const LiveState& state, bool colour, const TerminalSize& size
   }
   const std::string of_felt = format(state.top, 4) + " " + state.unit + " from rest";
   const std::string meaning = raw    ? "1 is " + of_felt
-                              : both ? "felt: " + of_felt + "; drawn: the plate's highest"
-                                     : "the plate's highest";
+                              : both ? "felt: " + of_felt + "; drawn: the highest"
+                                     : "the highest";
   return text + scale_line(colour, size.columns, meaning) + status_line(state, size.columns);
 }
 

@@ -110,7 +110,7 @@ function drawBar(g, w, [low, high], left = 30) {
 }
 const feltEnds = (event, w) =>
     ["at rest", event && event.felt ? `${event.top.toPrecision(3)} ${supertac.hello.unit}${w < 240 ? "" : " from rest"}` : ""];
-const drawnEnds = (w) => w < 240 ? ["flat", "highest"] : ["0, flat", "1, the plate's highest"];
+const drawnEnds = (w) => w < 240 ? ["0", "highest"] : ["0", "1, the highest"];
 
 // values [column][row] up to `top`, oldest first, the newest at the right edge.
 function drawStrip(canvas, values, top, rows, labels, withTime) {

@@ -235,7 +235,7 @@ function snapshot() {
   const root = document.documentElement.style;
   root.setProperty("--quiet", "#333");
   const alarm = event.unlike ? "; UNLIKE TRAINING" : "";
-  const place = event.x === undefined ? "" : `, finger at x ${event.x.toFixed(1)} mm, y ${event.y.toFixed(1)} mm`;
+  const place = event.x === undefined ? "" : `, centre at x ${event.x.toFixed(1)} mm, y ${event.y.toFixed(1)} mm`;
   g.fillStyle = "#111";
   g.textBaseline = "top";
   g.font = "600 15px system-ui, sans-serif";

@@ -242,6 +242,10 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
   recording.body = sensor.body, recording.source = "imported";
   recording.time_s = times_of(path, table, columns.time, unit, sensor.rate_hz);
   check_rate(path, table, columns.time, recording, sensor.rate_hz);
+  // No sensor has been on since 2001: such a clock counts from 1970.
+  constexpr double kWallClockS = 1e9;
+  if (!recording.time_s.empty() && recording.time_s.front() >= kWallClockS)
+    recording.metadata["began_s"] = "0";
   std::vector<bool> silent(columns.values.size());
   for (const int taxel : sensor.dead)
     for (int c = 0; c < sensor.array.channels && sensor.order.empty(); ++c)

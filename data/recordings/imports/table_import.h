@@ -26,9 +26,10 @@ ColumnMap column_map(const std::string& text);
 
 /// The frames of a table, as the sensor would have sent them (Sensor::arrange). Rows with the same time
 /// stamp, of a clock that is coarser than the frames, are spread over the time to the next; a counter of 16
-/// or 32 bits may run over. Throws FileError that names the column and what speaks against it: missing; as
-/// time, falling or of another rate than the sensor's; as a taxel, no finite number, or outside of the
-/// sensor's range for most of the time; too many or too few of them.
+/// or 32 bits may run over. Times from 1e9 s on are since 1970, and stay so (Recording::began_s() is 0).
+/// Throws FileError that names the column and what speaks against it: missing; as time, falling or of another
+/// rate than the sensor's; as a taxel, no finite number, or outside of the sensor's range for most of the
+/// time; too many or too few of them.
 Recording recording_of_table(const std::string& path, const Table& table, const ColumnMap& map,
                              const Sensor& sensor);
 

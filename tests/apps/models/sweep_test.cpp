@@ -15,7 +15,8 @@ namespace {
 namespace fs = std::filesystem;
 
 const std::string kHeader =
-    "model,preset,timesteps,latent,scale,channels,rcabs,seed,split,windows,ssim,psnr_db,phase,phase_floor,"
+    "model,preset,timesteps,latent,scale,channels,rcabs,seed,split,left_out,windows,ssim,psnr_db,phase,phase_"
+    "floor,"
     "position_mm,all_windows,all_ssim,all_psnr_db,all_phase,all_phase_floor,all_position_mm,median_us,p99_us,"
     "mmac,parameters,train_s,steps,commit";
 
@@ -150,6 +151,29 @@ TEST_F(Sweep, ReportsTheParetoFrontOfMeansOverSeeds) {
   EXPECT_EQ(json["front"][1]["configuration"], "slow");
   EXPECT_DOUBLE_EQ(json["front"][1]["ssim"].get<double>(), 1.9);
   EXPECT_DOUBLE_EQ(json["front"][1]["median_us"].get<double>(), 2e6);
+}
+
+// A model for each kind of object, which has not seen it.
+TEST_F(Sweep, LeavesOutEachGroupInTurn) {
+  write_file(path("pad.json"),
+             R"({"rows": 3, "columns": 4, "pitch_mm": 5, "pressed": "higher", "unit": "counts",
+    "range": [0, 900], "rate_hz": 50, "frame": {"kind": "text"}})");
+  succeed("supertac-simulate --sensor pad.json --presses 40 --scale 2 --out pressed");
+  const std::string each =
+      "supertac-sweep --out each --data pressed --preset frame --scale 2 --split group --leave-out each "
+      "--epochs 1 --batch 32 --threads 1 --limit 20 --json each.json";
+  const ProcessResult ran = succeed(each);
+  const std::vector<std::string> kinds = {"bar",       "blob",   "disc",  "edge",
+                                          "fingertip", "letter", "mixed", "ring"};
+  EXPECT_EQ(column_of(bytes("each/sweep.csv"), "left_out"), kinds);
+  EXPECT_TRUE(contains(bytes("each/chart.html"), "Each left out in turn"));
+  const auto json = parse_json_limited(bytes("each.json"));
+  EXPECT_EQ(json["configurations"], 1) << "one mean over all that were left out";
+  ASSERT_EQ(json["left_out"].size(), 8U);
+  for (std::size_t i = 0; i + 1 < 8; ++i)
+    EXPECT_LE(json["left_out"][i]["ssim"].get<double>(), json["left_out"][i + 1]["ssim"].get<double>());
+  for (const std::string& kind : kinds) EXPECT_TRUE(contains(ran.out, "_s0_" + kind + ": SSIM ")) << kind;
+  expect_exit(sweep("wrong", "--leave-out each"), 2, "--leave-out each: only with --split group or texture");
 }
 
 TEST_F(Sweep, BadInputIsOneLine) {

@@ -66,7 +66,7 @@ TEST(TerminalView, YGrowsUpwardsAndBothPicturesHaveTheSameSize) {
   EXPECT_EQ(lines[4], lines[1]);
   EXPECT_EQ(lines[5], std::string(67, ' '));
   EXPECT_EQ(lines[16], std::string(65, ' ') + "@@");
-  EXPECT_EQ(lines[17], "0  .:-=+*#%@ 1  felt: 0.2500 V from rest; drawn: the plate's highest");
+  EXPECT_EQ(lines[17], "0  .:-=+*#%@ 1  felt: 0.2500 V from rest; drawn: the highest");
   EXPECT_EQ(lines[18], "0 frames/s  latency 0.00 ms (p99 0.00)  lost 0  dropped 0");
 }
 

@@ -80,6 +80,26 @@ std::string message_of_parts(const Parts& parts) {
   return message.starts_with(folder.file("a: ")) ? message.substr(path) : message;
 }
 
+// Counts are no volts; files until 0.2, in which all signals were, are read for ever.
+TEST(Recording, ATensorIsNamedForWhatItHolds) {
+  TemporaryFolder folder;
+  Recording written = example();
+  write_recording(folder.file("rig"), written);
+  EXPECT_TRUE(SafetensorsFile::read(folder.file("rig")).tensors().contains("volts"));
+  written.signal_scale = {.unit = "counts", .rest = 0, .span = -900};
+  write_recording(folder.file("counts"), written);
+  const SafetensorsFile file = SafetensorsFile::read(folder.file("counts"));
+  EXPECT_TRUE(file.tensors().contains("signals"));
+  EXPECT_FALSE(file.tensors().contains("volts"));
+  EXPECT_EQ(recording_of(file).volts, written.volts);
+  Parts old;
+  old.metadata["signals"] = R"({"unit":"counts","pressed":"higher","range":[0,900]})";
+  write_safetensors(folder.file("old"), old.metadata,
+                    {{"time_s", "F64", {2}, std::as_bytes(std::span(old.time_s))},
+                     {"volts", "F32", {2, 16}, std::as_bytes(std::span(old.volts))}});
+  EXPECT_EQ(read_recording(folder.file("old")).volts, old.volts);
+}
+
 TEST(Recording, RefusesAnArrayThatIsNone) {
   TemporaryFolder folder;
   Recording recording = example();
@@ -90,7 +110,7 @@ TEST(Recording, RefusesAnArrayThatIsNone) {
   recording.array.rows = 65;
   recording.volts.resize(recording.frames() * 17 * 4);
   EXPECT_EQ(what_of<std::invalid_argument>([&] { write_recording(folder.file("a"), recording); }),
-            "write_recording: volts has 476 values, expected 1820 for 7 frames");
+            "write_recording: signals has 476 values, expected 1820 for 7 frames");
   constexpr std::pair<const char*, const char*> kArrays[] = {
       {"4x4", "metadata \"array\": not valid JSON at byte 2"},
       {"4", "metadata \"array\": expected an object {...}, found 4"},
@@ -117,11 +137,11 @@ TEST(Recording, FileNameTellsWhatItIs) {
 TEST(Recording, WritesNoneThatBreaksARule) {
   TemporaryFolder folder;
   const std::pair<void (*)(Recording&), const char*> cases[] = {
-      {[](Recording& r) { r.volts.pop_back(); }, "volts has 111 values, expected 112 for 7 frames"},
+      {[](Recording& r) { r.volts.pop_back(); }, "signals has 111 values, expected 112 for 7 frames"},
       {[](Recording& r) { r.position_mm.pop_back(); }, "position_mm has 13 values, expected 14 for 7 frames"},
       {[](Recording& r) { r.time_s[3] = r.time_s[2]; }, "time_s does not increase at frame 3"},
       {[](Recording& r) { r.time_s[3] = std::nan(""); }, "time_s is not finite at frame 3"},
-      {[](Recording& r) { r.volts[17] = INFINITY; }, "volts are not finite at frame 1, taxel 1"},
+      {[](Recording& r) { r.volts[17] = INFINITY; }, "signals are not finite at frame 1, taxel 1"},
       {[](Recording& r) { r.trial = -1; }, "trial and pass must not be negative"},
       {[](Recording& r) { r.metadata["plate"] = "x"; },
        "the metadata field 'plate' is a member of the recording; set it there"}};
@@ -169,7 +189,7 @@ TEST(Recording, ReadsNoneThatBreaksARule) {
        },
        "time_s does not increase at frame 1; record or import it again"},
       {[](Parts& p) { p.volts[20] = NAN; },
-       "volts are not finite at frame 1, taxel 4; record or import it again"}};
+       "signals are not finite at frame 1, taxel 4; record or import it again"}};
   for (const auto& [damage, refusal] : cases) {
     Parts parts;
     damage(parts);

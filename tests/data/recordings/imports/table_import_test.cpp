@@ -67,6 +67,19 @@ class TableImport : public testing::Test {
   TemporaryFolder folder_;
 };
 
+// Seconds since 1970 stay so, for MCAP and whoever lays recordings beside others; a clock since boot says no
+// date.
+TEST_F(TableImport, ATimeSince1970IsOne) {
+  const auto began = [&](double first) {
+    std::string text = "t,a,b,c,d\n";
+    for (int i = 0; i < 50; ++i) text += format(first + 0.01 * i, 3) + ",50,60,70,80\n";
+    const Recording recording = import(file(text), "time=t,values=a-d");
+    return recording.began_s() + recording.time_s.front();
+  };
+  EXPECT_DOUBLE_EQ(began(1790000000.25), 1790000000.25);
+  EXPECT_TRUE(std::isnan(began(90000.5)));
+}
+
 TEST_F(TableImport, ColumnsByNameMillisecondsAndPositions) {
   const Recording r = import(file(csv(50)), "time=t_ms:ms,x=px,y=py");
   ASSERT_EQ(r.frames(), 50U);
