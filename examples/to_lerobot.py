@@ -22,8 +22,13 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset  # noqa: E402
 NAMES = {"volts": "observation.taxels", "position_mm": "observation.position_mm", "pictures": "observation.picture"}
 
 
+def episode(path):
+    tensors, metadata = supertac.read(path)  # "signals" of sensors that give no volts
+    return {"volts" if name == "signals" else name: values for name, values in tensors.items()}, metadata
+
+
 def main(out, fps, *files):
-    episodes = [supertac.read(path) for path in map(pathlib.Path, files)]
+    episodes = [episode(path) for path in map(pathlib.Path, files)]
     common = [name for name in NAMES if all(name in tensors for tensors, _ in episodes)]
     period_s = np.median(np.concatenate([np.diff(tensors["time_s"]) for tensors, _ in episodes]))
     between = np.arange(1 - max(1, round(1 / float(fps) / period_s)), 1)  # frames of touch up to the newest
