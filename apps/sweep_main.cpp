@@ -82,8 +82,6 @@ std::size_t seed_in(const std::string& model) {
 
 // What can be left out of the recordings, each once: their groups, or their plates.
 std::vector<std::string> each_of(const Arguments& a, SplitKind split) {
-  if (split != SplitKind::group && split != SplitKind::texture)
-    throw UsageError("--leave-out each: only with --split group or texture");
   std::set<std::string> names;
   for (const std::string& path : list_recordings(a.text("data")))
     names.insert(

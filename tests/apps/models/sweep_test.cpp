@@ -173,7 +173,7 @@ TEST_F(Sweep, LeavesOutEachGroupInTurn) {
   for (std::size_t i = 0; i + 1 < 8; ++i)
     EXPECT_LE(json["left_out"][i]["ssim"].get<double>(), json["left_out"][i + 1]["ssim"].get<double>());
   for (const std::string& kind : kinds) EXPECT_TRUE(contains(ran.out, "_s0_" + kind + ": SSIM ")) << kind;
-  expect_exit(sweep("wrong", "--leave-out each"), 2, "--leave-out each: only with --split group or texture");
+  expect_exit(sweep("wrong", "--leave-out each"), 2, "--leave-out needs --split texture or group");
 }
 
 TEST_F(Sweep, BadInputIsOneLine) {
