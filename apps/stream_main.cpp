@@ -9,6 +9,7 @@
 #include "apps/stream/stream.h"
 #include "apps/web/web_options.h"
 #include "data/plates/plate_file.h"
+#include "hardware/boards/listen.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
@@ -138,7 +139,7 @@ ProbeReport probe_port(const Arguments& a) {
   a.note("listening for " + format(seconds) +
          (gain ? " s: press every taxel equally hard, many at once with something flat, and let go"
                : " s: press here and there, and let go"));
-  const std::vector<Heard> heard = listen(opened, sensor.port, seconds);
+  const std::vector<Heard> heard = listen(opened, sensor.port, seconds, interrupted);
   const auto known = described ? std::optional(sensor) : std::nullopt;
   ProbeReport report = gain && known ? ProbeReport{{}, known} : probe(heard, sensor.port, known);
   if (gain && report.draft) {

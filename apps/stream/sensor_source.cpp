@@ -146,28 +146,6 @@ std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup
   return std::make_unique<BoardSource>(std::move(serial), true, speedup, std::move(journal), capture);
 }
 
-std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, double seconds) {
-  constexpr std::size_t kMostBytes = std::size_t{16} << 20;
-  std::vector<Heard> heard;
-  std::vector<std::byte> buffer(65536);
-  std::size_t bytes = 0;
-  const double until = opened.port->now() + seconds;
-  try {
-    while (!interrupted() && opened.port->now() < until && bytes < kMostBytes) {
-      const Received got = opened.port->read(buffer, std::min(until, opened.port->now() + 0.05));
-      if (got.count == 0) continue;
-      heard.push_back({got.time_s, {reinterpret_cast<const char*>(buffer.data()), got.count}});
-      // A datagram of text is a line, as open_port() makes one of it for a sensor that is known to send text.
-      std::string& text = heard.back().bytes;
-      if (port.starts_with("udp:") && std::ranges::all_of(text, [](char c) { return c >= ' ' && c <= '~'; }))
-        text += '\n';
-      bytes += got.count;
-    }
-  } catch (const PortUnplugged&) {  // what came until then is what there is
-  }
-  return heard;
-}
-
 std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup) {
   constexpr std::string_view kSerial = "serial:";
   const bool calibrated = !sensor.rest.empty() || !sensor.gain.empty() || sensor.follow_rest_s > 0;

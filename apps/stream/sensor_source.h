@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "data/frames/probe.h"
 #include "data/recordings/recording.h"
 #include "hardware/boards/tactile_board.h"
 #include "hardware/ports/open_port.h"
@@ -61,8 +60,6 @@ class SensorSource {
   Sensor sensor_;
 };
 
-/// What the opened `port` sends within `seconds`.
-std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, double seconds);
 /// Any sensor at its port. Throws as open_port().
 std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup);
 

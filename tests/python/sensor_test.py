@@ -128,7 +128,6 @@ def sends(master, seconds):
                                  for k in range(i, due)).encode())
         i = due
         time.sleep(2e-3)
-    time.sleep(1)
 
 
 def check_live(folder, seconds):
@@ -144,15 +143,17 @@ def check_live(folder, seconds):
     tty.setraw(slave)
     (folder / "fast.json").write_text(json.dumps({**rig, "port": f"serial:{os.ttyname(slave)}@921600"}))
     frames, live = supertac.Sensor(folder / "fast.json").open(), supertac.LiveWindow(model, 1008)
-    others = [multiprocessing.Process(target=busy, daemon=True), multiprocessing.Process(target=sends, args=(master, seconds))]
+    others = [multiprocessing.Process(target=busy, daemon=True),
+              multiprocessing.Process(target=sends, args=(master, seconds + 2))]
     for process in others:
         process.start()
-    count, drawn, waits = 0, 0, []
+    count, drawn = 0, 0
     for frame in frames:
         count, drawn = count + 1, drawn + (live.push(frame.time_s, frame.signals) is not None)
         if count >= 1008 * seconds:
             break
-    others[0].kill()
+    for process in others:
+        process.kill()
     missing, dropped = frames.lost
     print(f"{count} frames in {seconds} s, {drawn} pictures, {missing} missing, {dropped} dropped")
     assert missing == 0 and dropped == 0
