@@ -2,7 +2,7 @@
 """What a clean build costs: processor seconds, the largest compiler's memory, the size of what is installed.
 
 Builds in a folder of its own, without a compiler's cache: once what scripts/demo.sh builds, once everything with tests.
-Prints the table of CONTRIBUTING.md; times are of this machine's processors and grow where others use them as well.
+Prints a table, of which CONTRIBUTING.md has a row; times are of this machine's processors and grow where others use them as well.
     scripts/build_cost.py [demo|all]
 """
 import pathlib
