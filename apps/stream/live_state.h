@@ -39,7 +39,7 @@ struct LiveState {
   std::uint64_t lost = 0, dropped = 0;
 
   /// Mean of half_widths; 0 when unknown.
-  double doubt() const { return half_widths.empty() ? 0 : mean_of(half_widths); }
+  double uncertainty() const { return half_widths.empty() ? 0 : mean_of(half_widths); }
 };
 
 }  // namespace supertac

@@ -70,7 +70,7 @@ void check_strips(const char* where, std::span<const Strip> strips, const StripL
 
 // Panels of a strip.
 int parts_of(std::span<const Strip> strips) {
-  return std::ranges::any_of(strips, [](const Strip& s) { return !s.doubt.empty(); }) ? 4 : 3;
+  return std::ranges::any_of(strips, [](const Strip& s) { return !s.uncertainty.empty(); }) ? 4 : 3;
 }
 
 // Strips below each other, their parts side by side; `turned`: the other way round.
@@ -84,7 +84,7 @@ Picture picture_of(const char* where, std::span<const Strip> strips, const Strip
     const Strip& strip = strips[static_cast<std::size_t>(i)];
     panel.left = gap + (turned ? i * step_x : 0), panel.top = gap + (turned ? 0 : i * step_y);
     draw_panel(picture, panel, strip.input, l.rows, l.columns);
-    for (const std::span<const float> part : {strip.output, strip.truth, strip.doubt}) {
+    for (const std::span<const float> part : {strip.output, strip.truth, strip.uncertainty}) {
       if (part.empty()) continue;
       (turned ? panel.top : panel.left) += turned ? step_y : step_x;
       draw_panel(picture, panel, part, l.rows * l.scale, l.columns * l.scale);

@@ -45,7 +45,7 @@ struct Strip {
   std::span<const float> input;   ///< [rows][columns], the window's last frame (mean of a taxel's channels)
   std::span<const float> output;  ///< [rows * scale][columns * scale]
   std::span<const float> truth;   ///< [rows * scale][columns * scale]
-  std::span<const float> doubt;   ///< the same, how far off the output may be; empty = not drawn
+  std::span<const float> uncertainty;  ///< the same, how far off the output may be; empty = not drawn
 };
 
 /// How strips are drawn: each part in a panel whose longer side has `side` pixels.
@@ -53,12 +53,12 @@ struct StripLayout {
   int rows = 4, columns = 4, scale = 4, side = 128;
 };
 
-/// One line per strip: input | output | truth | doubt, if any has one, with gaps of side / 16 (at least 1).
-/// Throws std::invalid_argument when there is no strip or a size is wrong.
+/// One line per strip: input | output | truth | uncertainty, if any has one, with gaps of side / 16 (at least
+/// 1). Throws std::invalid_argument when there is no strip or a size is wrong.
 Picture strip_picture(std::span<const Strip> strips, const StripLayout& layout);
 
 /// A whole pass as a film: one column per strip, in the order given; input above output above
-/// truth above doubt.
+/// truth above uncertainty.
 /// Throws as strip_picture.
 Picture film_picture(std::span<const Strip> strips, const StripLayout& layout);
 

@@ -108,7 +108,8 @@ std::string status_line(const LiveState& state, int columns) {
   std::string line =
       format(state.frames_per_s, 0) + " frames/s  latency " + format(state.median_ms, 2) + " ms (p99 " +
       format(state.p99_ms, 2) + ")  lost " + std::to_string(state.lost) + "  dropped " +
-      std::to_string(state.dropped) + (state.doubt() > 0 ? "  +-" + format(state.doubt(), 2) : "") +
+      std::to_string(state.dropped) +
+      (state.uncertainty() > 0 ? "  +-" + format(state.uncertainty(), 2) : "") +
       (std::isfinite(state.x_mm) ? "  at x " + format(static_cast<double>(state.x_mm), 1) + " y " +
                                        format(static_cast<double>(state.y_mm), 1) + " mm"
                                  : "");

@@ -94,7 +94,7 @@ TEST(Strips, StandInputOutputTruthSideBySide) {
 TEST(Strips, ShowTheDoubtBehindTheTruth) {
   const Windows windows;
   Strip strip = windows.strip();
-  strip.doubt = windows.output;
+  strip.uncertainty = windows.output;
   const std::vector<Strip> strips{windows.strip(), strip};
   const Picture across = strip_picture(strips, kSmall), down = film_picture(strips, kSmall);
   EXPECT_EQ(across.width, 4 * 17 + 1);
