@@ -174,6 +174,76 @@ TEST_F(Library, MapsAsTheCppLibraryDoes) {
   supertac_close(model);
 }
 
+TEST_F(Library, GivesTheWindowsAndTruthsOfTheCppLibrary) {
+  const std::string data = folder_ / "data";
+  make_directories(data);
+  write_recording(data + "/a.safetensors", make_recording({.frames = 400, .level = 2.2F}));
+  const Model model(supertac_open(path_.c_str(), SUPERTAC_FP32));
+  supertac_pairs* const pairs = supertac_pairs_open(model.get(), data.c_str(), 3);
+  ASSERT_NE(pairs, nullptr) << supertac_error();
+  WindowSettings settings = file_.windows();
+  settings.stride = 3;
+  const WindowSet expected = WindowSet::load(data, {}, settings);
+  const std::size_t count = supertac_pairs_count(pairs), pixels = expected.image().pixels();
+  ASSERT_EQ(count, expected.size());
+  ASSERT_GT(count, 5U);
+  std::vector<float> windows((count - 2) * expected.input_size()), truths((count - 2) * pixels);
+  ASSERT_EQ(supertac_pairs_read(pairs, 2, count - 2, windows.data(), truths.data()), 0);
+  std::vector<float> window(expected.input_size()), truth(pixels);
+  for (std::size_t i = 2; i < count; ++i) {
+    expected.window(i, window), expected.truth(i, truth);
+    EXPECT_TRUE(
+        std::ranges::equal(window, std::span(windows).subspan((i - 2) * window.size(), window.size())));
+    EXPECT_TRUE(std::ranges::equal(truth, std::span(truths).subspan((i - 2) * pixels, pixels)));
+  }
+  EXPECT_EQ(supertac_pairs_read(pairs, 3, count - 2, windows.data(), truths.data()), -1);
+  supertac_pairs_close(pairs);
+  EXPECT_EQ(supertac_pairs_open(model.get(), data.c_str(), 0), nullptr);
+  EXPECT_EQ(supertac_pairs_open(model.get(), (folder_ / "none").c_str(), 1), nullptr);
+  EXPECT_NE(std::string(supertac_error()).find("none"), std::string::npos);
+}
+
+TEST_F(Library, ReadsASensorToItsEnd) {
+  const std::string sensor_file = folder_ / "mat.json", lines = folder_ / "lines.csv";
+  write_file(sensor_file, R"({"name": "mat", "rows": 1, "columns": 3, "pitch_mm": 5, "unit": "counts",
+"pressed": "higher", "range": [0, 100], "rate_hz": 100, "port": "missing.csv", "order": [2, 1, 0], "dead": [1],
+"frame": {"kind": "text", "separator": ",", "time": {"column": 0, "unit": "ms"}}})");
+  write_file(lines, "0,1,2,3\n10,4,5,100\n20,x,8,9\n30,10,11,12\n");
+  supertac_sensor* const sensor = supertac_sensor_new(sensor_file.c_str());
+  ASSERT_NE(sensor, nullptr) << supertac_error();
+  supertac_sensor_description about{};
+  about.size = sizeof about;
+  ASSERT_EQ(supertac_sensor_describe(sensor, &about), 0);
+  EXPECT_STREQ(about.name, "mat");
+  EXPECT_STREQ(about.unit, "counts");
+  EXPECT_STREQ(about.port, "missing.csv");
+  EXPECT_EQ(about.signals, 3);
+  EXPECT_EQ(about.rest - about.span, 100);
+  supertac_frame frame{};
+  float signals[3];
+  EXPECT_EQ(supertac_sensor_next(sensor, 1, &frame, signals), -1);  // not started
+  EXPECT_EQ(supertac_sensor_start(sensor, nullptr), -1);
+  EXPECT_NE(std::string(supertac_error()).find("missing.csv"), std::string::npos);
+  ASSERT_EQ(supertac_sensor_start(sensor, lines.c_str()), 0) << supertac_error();
+  std::vector<std::vector<float>> seen;
+  std::vector<double> times;
+  int result = 0;
+  while ((result = supertac_sensor_next(sensor, 5, &frame, signals)) == 1) {
+    seen.emplace_back(signals, signals + 3), times.push_back(frame.time_s);
+    EXPECT_NEAR(frame.total_force, (signals[0] + signals[1] + signals[2]) / 100, 1e-6);
+    EXPECT_EQ(frame.saturated, signals[0] == 100 ? 1U : 0U);
+  }
+  EXPECT_EQ(result, SUPERTAC_ENDED) << supertac_error();
+  EXPECT_EQ(seen, (std::vector<std::vector<float>>{{3, 2, 1}, {100, 52, 4}, {12, 11, 10}}));
+  ASSERT_EQ(times.size(), 3U);
+  EXPECT_NEAR(times[1] - times[0], 0.01, 1e-6);
+  EXPECT_NEAR(times[2] - times[0], 0.03, 1e-6);
+  EXPECT_EQ(supertac_sensor_start(sensor, lines.c_str()), -1);  // it is being read
+  supertac_sensor_free(sensor);
+  supertac_sensor_free(nullptr);
+  EXPECT_EQ(supertac_sensor_new((folder_ / "none.json").c_str()), nullptr);
+}
+
 TEST_F(Library, TrainsWhatTheCppLibraryTrains) {
   make_directories(folder_ / "data");
   write_recording(folder_ / "data/a.safetensors", make_recording({.frames = 3000}));
