@@ -243,9 +243,11 @@ BodyFit BodyFitter::operator()(const Recording& touches) const {
         "there for half a minute, or let the probe find the range");
   fit.unlike = regression_->unlike(found);
   if (fit.unlike > kMostUnlike)
-    throw std::runtime_error("these touches are like none that were simulated (" + format(fit.unlike, 3) +
-                             " standard deviations off, at most " + format(kMostUnlike) +
-                             "): look at the sensor's range, order and pitch first (supertac-stream --web)");
+    throw std::runtime_error(
+        "these touches are like none that were simulated (" + format(fit.unlike, 3) +
+        " standard deviations off, at most " + format(kMostUnlike) +
+        "): look at the sensor's range, order and pitch first (supertac-stream --web), or leave "
+        "the fit out");
   const double pitch = std::sqrt(sensor_.array.pitch_mm.x * sensor_.array.pitch_mm.y);
   const std::vector<double> predicted = (*regression_)(found);
   for (std::size_t k = 0; k < kNumbers; ++k) {
