@@ -131,8 +131,8 @@ std::uint64_t millimetres_at(const PalpationPlan& plan, const Leg& leg, const Po
   return millimetres(plan, leg.pass - 1, std::clamp(part, 0.0, plan.slide));
 }
 
-std::string live_text(const Point3& at, const BoardCounters& board) {
-  return "X" + format(at.x, 1) + " Y" + format(at.y, 1) + "  " + format(1 / board.clock.period_s, 0) +
+std::string live_text(const Point3& at, const ReaderCounters& board) {
+  return "X" + format(at.x, 1) + " Y" + format(at.y, 1) + "  " + format(1 / board.period_s, 0) +
          " frames/s  " + std::to_string(board.missing) + " lost";
 }
 
@@ -232,7 +232,7 @@ RecorderReport collect(const Arguments& arguments, std::unique_ptr<Port> board, 
   Progress progress(arguments, "collecting", millimetres(plan, plan.passes, 0), "mm");
   const std::vector<Leg> legs = legs_of(plan, settings.bed.origin);
   const double speedup = arguments.number("speedup", 0.1, 100);
-  settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters& counters) {
+  settings.progress = [&](const Leg& leg, const Point3& at, const ReaderCounters& counters) {
     progress.update(millimetres_at(plan, leg, at), live_text(at, counters),
                     seconds_left(legs, leg, at) / speedup);
     if (page) page->update(leg, at, counters);

@@ -45,7 +45,9 @@ std::unique_ptr<SensorSource> open_source(const Arguments& a, double speedup) {
   if (a.given("recording")) return open_recording(a.text("recording"));
   if (a.given("sensor")) return open_sensor(read_sensor(a.text("sensor")), speedup);
   const std::string capture = a.text("capture");
-  return open_board(a.text("board"), speedup, capture);
+  Sensor board;
+  board.port = "serial:" + a.text("board") + "@" + std::to_string(rig::kBoardBaud);
+  return open_sensor(board, speedup, capture);
 }
 
 /// A pseudo-terminal has a rig behind it that is none.

@@ -81,13 +81,7 @@ int supertac_sensor_next(supertac_sensor* sensor, double wait_s, supertac_frame*
     const std::optional<ReadFrame> frame = sensor->reader->next(wait_s);
     if (!frame) return sensor->reader->ended() ? SUPERTAC_ENDED : 0;
     const FrameLoad load = load_of(frame->signals, sensor->sensor.array.channels, sensor->sensor.scale);
-    const double time_s = [](const auto& read) {
-      if constexpr (requires { read.date; })
-        return read.date.time_s;
-      else
-        return read.time_s;
-    }(*frame);
-    *about = {time_s, load.total_force, load.saturated};
+    *about = {frame->date.time_s, load.total_force, load.saturated};
     std::ranges::copy(frame->signals, signals);
     return 1;
   });

@@ -43,7 +43,7 @@ WebSite CollectView::site() {
           .file = {}};
 }
 
-void CollectView::update(const Leg& leg, const Point3& at, const BoardCounters& board) {
+void CollectView::update(const Leg& leg, const Point3& at, const ReaderCounters& board) {
   const std::unique_lock lock(mutex_, std::try_to_lock);
   if (lock) newest_ = State{leg, at, board};
 }
@@ -87,7 +87,7 @@ std::string CollectView::news() {
                  {"left_s", seconds_left(legs_, leg, at) / speedup_},
                  {"done", (bed_.plan.slide * (leg.pass - 1) + slid) / (bed_.plan.slide * bed_.plan.passes)},
                  {"frames", board.decoder.frames},
-                 {"rate", board.clock.period_s > 0 ? 1 / board.clock.period_s : 0},
+                 {"rate", board.period_s > 0 ? 1 / board.period_s : 0},
                  {"lost", board.missing},
                  {"suspect", board.suspect}});
 }

@@ -21,7 +21,7 @@ class CollectView {
               const std::string& source);
 
   /// Never waits.
-  void update(const Leg& leg, const Point3& at, const BoardCounters& board);
+  void update(const Leg& leg, const Point3& at, const ReaderCounters& board);
   std::string url() const { return server_.url(); }
   /// As WebServer.
   void end(const std::string& outcome, bool failed) { server_.end(outcome, failed); }
@@ -30,7 +30,7 @@ class CollectView {
   struct State {
     Leg leg;
     Point3 at;
-    BoardCounters board;
+    ReaderCounters board;
   };
   WebSite site();
   std::string hello() const;

@@ -133,6 +133,7 @@ std::string PassesReport::total(const std::string& became) const {
   return std::to_string(frames) + " frames" + became +
          (left_out > 0 ? ", " + std::to_string(left_out) + " left out, their time being uncertain" : "") +
          (doubtful > 0 ? ", " + std::to_string(doubtful) + " passes with doubtful positions" : "") +
+         (resets > 0 ? ", the sensor started anew " + std::to_string(resets) + " times" : "") +
          (damage.empty() ? "" : "; " + damage);
 }
 
@@ -140,7 +141,8 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
                           OutputFolder& folder) {
   const Collection collection = collection_of(read_journal(journal));
   const Header header = header_of(collection, journal);
-  PassesReport report{.complete = collection.complete, .damage = damage_of(collection)};
+  PassesReport report{
+      .complete = collection.complete, .resets = collection.resets, .damage = damage_of(collection)};
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   add_parent_file("journal", journal);
   for (const CollectedPass& pass : collection.passes) {
@@ -159,7 +161,7 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
   }
   if (Plate::is_file(header.plate))
     keep_plate_file((fs::path(journal).parent_path() / header.plate).string(), folder.path());
-  const ClockFit& clock = collection.clock;
+  const FrameTimeline& clock = collection.clock;
   if (!clock.plausible)
     arguments.note("warning: the board's period is " + format(1e6 * clock.measured_s, 1) + " us, expected " +
                    format(1e6 * rig::kFramePeriodS, 0) + " +- 0.5 %; the nominal one is used");
@@ -176,6 +178,7 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
                  {"board_period_plausible", clock.plausible},
                  {"frames", report.frames},
                  {"left_out", report.left_out},
+                 {"device_resets", report.resets},
                  {"doubtful_passes", report.doubtful},
                  {"passes", passes}};
   return report;

@@ -20,6 +20,7 @@ struct PassesReport {
   std::size_t left_out = 0;  ///< frames whose time is uncertain
   std::size_t doubtful = 0;  ///< passes whose positions may be wrong
   bool complete = false;     ///< the run ended as planned
+  std::uint64_t resets = 0;  ///< of the sensor, by its stamps
   std::string damage = {};   ///< of the journal, in words; empty: none
   nlohmann::ordered_json json = {};
   /// "N frames" and what `became` of them, with what is to be said of doubtful passes and damage: the end of

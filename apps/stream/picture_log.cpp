@@ -84,12 +84,11 @@ void PictureLog::add(const Seen& seen) {
 
 // What the board's clock said, now that all frames are known.
 std::vector<std::byte> PictureLog::dated_times() {
-  const FrameTimeline timeline = timeline_of(arrivals_);
+  const FrameTimeline timeline = timeline_of({}, arrivals_);
   std::vector<double> times;
-  for (const FramePlace& place : timeline.places) {
-    kept_.push_back(place.doubt * timeline.clock.period_s <= kTrustedS);
-    const auto from_first = static_cast<double>(place.index - timeline.places.front().index);
-    if (kept_.back()) times.push_back(first_s_ + timeline.clock.period_s * from_first);
+  for (const FrameDate& date : timeline.dates) {
+    kept_.push_back(date.doubt_s() <= kTrustedS);
+    if (kept_.back()) times.push_back(first_s_ + date.time_s - timeline.dates.front().time_s);
   }
   if (times.empty()) return {};
   left_out_ = count_ - times.size();

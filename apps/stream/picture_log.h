@@ -19,7 +19,7 @@ namespace supertac {
 /// Metadata "began_s" is the wall-clock time of time_s 0 (s since 1970), where it is known. How many there
 /// will be is not known before the end, and they do not fit into memory (1 MB/s): they wait in nameless
 /// temporary files beside the final one. A recording of a board is dated at its end, by the clock that
-/// collections have (hardware/boards/frame_clock.h); frames whose time is uncertain by more than kTrustedS,
+/// collections have (data/clock/frame_clock.h); frames whose time is uncertain by more than kTrustedS,
 /// because the host or the board stood still, are left out, and metadata left_out_frames counts them.
 class PictureLog {
  public:

@@ -6,8 +6,8 @@
 #include <optional>
 #include <span>
 
+#include "data/clock/frame_clock.h"
 #include "data/sensors/taxel_array.h"
-#include "hardware/boards/frame_clock.h"
 
 namespace supertac {
 

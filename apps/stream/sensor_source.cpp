@@ -18,73 +18,55 @@ namespace {
 
 constexpr char kCaptureHeader[] = R"({"version":1,"kind":"stream"})";
 
-class BoardSource : public SensorSource {
+/// A file that keeps every byte of a port; an old one stays until the new one is complete.
+class Capture {
  public:
-  /// The capture takes the name `final_name` when it is complete.
-  BoardSource(std::unique_ptr<Port> port, bool live, double speedup = 1,
-              std::unique_ptr<JournalWriter> capture = nullptr, std::string final_name = {})
-      : SensorSource(rig::kFramePeriodS, 0, live),
-        final_name_(std::move(final_name)),
-        speedup_(speedup),
-        capture_(std::move(capture)),
-        board_(capture_ ? std::make_unique<CapturedPort>(std::move(port), *capture_, Stream::board)
-                        : std::move(port),
-               {.wait_for_consumer = !live}) {}
-
-  std::optional<SensorFrame> next(double wait_s) override {
-    if (capture_) capture_->check();
-    try {
-      const auto frame = board_.next(wait_s);
-      if (!frame) return std::nullopt;
-      volts_ = taxel_volts(frame->frame);
-      return SensorFrame{.time_s = frame->time_s,
-                         .volts = volts_,
-                         .arrived_s = arrived_s(frame->arrival.time_s, speedup_),
-                         .arrival = frame->arrival};
-    } catch (const PortUnplugged&) {  // how a capture that is replayed ends
-      if (live()) throw;
-      ended_ = true;
-      return std::nullopt;
-    }
-  }
-  bool ended() const override { return ended_; }
-  BoardCounters counters() override { return board_.counters(); }
-  void finish() override {
-    board_.stop();
-    if (!capture_) return;
-    capture_->close();
-    if (capture_->path() != final_name_) publish(capture_->path(), final_name_);
+  explicit Capture(const std::string& path)
+      : path_(path), writer_(std::filesystem::exists(path) ? path + ".new" : path, kCaptureHeader) {}
+  JournalWriter& writer() { return writer_; }
+  void complete() {
+    writer_.close();
+    if (writer_.path() != path_) publish(writer_.path(), path_);
   }
 
  private:
-  std::string final_name_;
-  double speedup_;
-  std::unique_ptr<JournalWriter> capture_;  // outlives the board, whose port writes to it
-  TactileBoard board_;
-  std::array<float, kTaxels> volts_{};
-  bool ended_ = false;
+  std::string path_;
+  JournalWriter writer_;
 };
 
-class ReaderSource : public SensorSource {
+class PortSource : public SensorSource {
  public:
-  ReaderSource(OpenedPort opened, const Sensor& sensor, double speedup = 1)
+  PortSource(OpenedPort opened, const Sensor& sensor, double speedup = 1,
+             std::unique_ptr<Capture> capture = nullptr)
       : SensorSource(1 / sensor.rate_hz, 0, opened.live, sensor),
+        // A recording of the rig's board is dated by all of its arrivals.
+        by_arrival_(sensor.frame.kind == FrameKind::board),
         speedup_(speedup),
+        capture_(std::move(capture)),
         reader_(std::move(opened), sensor) {}
 
   std::optional<SensorFrame> next(double wait_s) override {
+    if (capture_) capture_->writer().check();
     auto frame = reader_.next(wait_s);
     if (!frame) return std::nullopt;
     frame_ = std::move(*frame);
-    return SensorFrame{
-        .time_s = frame_.time_s, .volts = frame_.signals, .arrived_s = arrived_s(frame_.arrival_s, speedup_)};
+    SensorFrame out{.time_s = frame_.date.time_s,
+                    .volts = frame_.signals,
+                    .arrived_s = arrived_s(frame_.arrival.time_s, speedup_)};
+    if (by_arrival_) out.arrival = frame_.arrival;
+    return out;
   }
   bool ended() const override { return reader_.ended(); }
-  BoardCounters counters() override { return reader_.counters(); }
-  void finish() override { reader_.stop(); }
+  ReaderCounters counters() override { return reader_.counters(); }
+  void finish() override {
+    reader_.stop();
+    if (capture_) capture_->complete();
+  }
 
  private:
+  bool by_arrival_;
   double speedup_;
+  std::unique_ptr<Capture> capture_;  // outlives the reader, whose port writes to it
   ReadFrame frame_;
   SensorReader reader_;
 };
@@ -111,8 +93,8 @@ class RecordingSource : public SensorSource {
     return frame;
   }
   bool ended() const override { return at_ == recording_.frames(); }
-  BoardCounters counters() override {
-    BoardCounters counters;
+  ReaderCounters counters() override {
+    ReaderCounters counters;
     counters.decoder.frames = at_;
     return counters;
   }
@@ -135,24 +117,12 @@ double SensorSource::arrived_s(double port_s, double speedup) const {
   return live_ ? port_s / speedup : monotonic_seconds();
 }
 
-std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup,
-                                         const std::string& capture) {
-  auto serial =
-      std::make_unique<SerialPort>(resolve_board_port(port), SerialSettings{rig::kBoardBaud, speedup});
-  // An old capture stays until the new one is complete.
-  std::error_code error;
-  const std::string name = std::filesystem::exists(capture, error) ? capture + ".new" : capture;
-  auto journal = capture.empty() ? nullptr : std::make_unique<JournalWriter>(name, kCaptureHeader);
-  return std::make_unique<BoardSource>(std::move(serial), true, speedup, std::move(journal), capture);
-}
-
-std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup) {
-  constexpr std::string_view kSerial = "serial:";
-  const bool calibrated = !sensor.rest.empty() || !sensor.gain.empty() || sensor.follow_rest_s > 0;
-  if (sensor.frame.kind == FrameKind::board && sensor.port.starts_with(kSerial) && !calibrated)
-    return open_board(sensor.port.substr(kSerial.size(), sensor.port.rfind('@') - kSerial.size()), speedup,
-                      "");
-  return std::make_unique<ReaderSource>(open_port(sensor, speedup), sensor, speedup);
+std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup, const std::string& capture) {
+  OpenedPort opened = open_port(sensor, speedup);
+  auto kept = capture.empty() ? nullptr : std::make_unique<Capture>(capture);
+  if (kept)
+    opened.port = std::make_unique<CapturedPort>(std::move(opened.port), kept->writer(), Stream::board);
+  return std::make_unique<PortSource>(std::move(opened), sensor, speedup, std::move(kept));
 }
 
 std::unique_ptr<SensorSource> open_replay(const std::string& path,
@@ -162,8 +132,7 @@ std::unique_ptr<SensorSource> open_replay(const std::string& path,
     note(path + ": " + std::to_string(bytes) + " damaged bytes of the journal are missing");
   const Sensor sensor = sensor_of(journal);
   auto port = std::make_unique<ReplayPort>(journal.of(Stream::board), path, journal.lost_bytes);
-  if (sensor.frame.kind == FrameKind::board) return std::make_unique<BoardSource>(std::move(port), false);
-  return std::make_unique<ReaderSource>(OpenedPort{.port = std::move(port), .live = false}, sensor);
+  return std::make_unique<PortSource>(OpenedPort{.port = std::move(port), .live = false}, sensor);
 }
 
 std::unique_ptr<SensorSource> open_recording(const std::string& path) {

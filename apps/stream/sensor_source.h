@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "data/recordings/recording.h"
-#include "hardware/boards/tactile_board.h"
+#include "hardware/boards/sensor_reader.h"
 #include "hardware/ports/open_port.h"
 
 namespace supertac {
@@ -32,7 +32,7 @@ class SensorSource {
   /// (hardware/ports/errors.h) after the frames before it.
   virtual std::optional<SensorFrame> next(double wait_s) = 0;
   virtual bool ended() const = 0;
-  virtual BoardCounters counters() = 0;
+  virtual ReaderCounters counters() = 0;
   /// Stops reading and completes the capture. Throws JournalError.
   virtual void finish() = 0;
 
@@ -60,11 +60,11 @@ class SensorSource {
   Sensor sensor_;
 };
 
-/// Any sensor at its port. Throws as open_port().
-std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup);
+/// Any sensor at its port. With `capture` every byte also goes to a journal of that path. Throws as
+/// open_port().
+std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup,
+                                          const std::string& capture = "");
 
-/// The board at `port` ("auto" finds it). With `capture` every byte also goes to a journal of that path.
-std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup, const std::string& capture);
 /// The sensor's part of a journal, as fast as it is taken.
 std::unique_ptr<SensorSource> open_replay(const std::string& path,
                                           const std::function<void(const std::string&)>& note);

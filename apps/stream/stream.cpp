@@ -181,11 +181,13 @@ std::string Stream::rate_remark() const {
 }
 
 std::string Stream::summary() const {
-  const BoardCounters counters = source_.counters();
+  const ReaderCounters counters = source_.counters();
   return std::to_string(frames_) + " frames in " + format(last_s_ - first_s_, 1) + " s, " +
          std::to_string(pictures()) + (maker_ ? " pictures" : " shown") + ", latency median " +
          format(milliseconds(0.5), 2) + " ms, p99 " + format(milliseconds(0.99), 2) + " ms; lost " +
          std::to_string(counters.missing) + ", dropped " + std::to_string(dropped()) +
+         (counters.resets > 0 ? ", the sensor started anew " + std::to_string(counters.resets) + " times"
+                              : "") +
          (lines_lost_ > 0 ? ", " + std::to_string(lines_lost_) + " lines not taken by their reader" : "") +
          (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "") +
          (map_ && !map_->empty() ? "; map of " + elements_text(elements(named_map())) : "") +
@@ -197,18 +199,19 @@ std::string Stream::summary() const {
 }
 
 nlohmann::ordered_json Stream::result() const {
-  const BoardCounters counters = source_.counters();
+  const ReaderCounters counters = source_.counters();
   nlohmann::ordered_json result = {{"seconds", last_s_ - first_s_},
                                    {"frames", frames_},
                                    {"pictures", pictures()},
                                    {"unlike_training", unlike_},
                                    {"lost", counters.missing},
                                    {"dropped", dropped()},
+                                   {"resets", counters.resets},
                                    {"suspect", counters.suspect},
                                    {"jumps", counters.jumps},
                                    {"gaps", gaps()},
                                    {"lines_lost", lines_lost_},
-                                   {"board_period_us", 1e6 * counters.clock.period_s},
+                                   {"board_period_us", 1e6 * counters.period_s},
                                    {"latency_ms",
                                     {{"median", milliseconds(0.5)},
                                      {"p99", milliseconds(0.99)},
@@ -315,7 +318,7 @@ void Stream::show() {
   if ((!view_ && !web_) || now - shown_s_ < kShowEveryS) return;
   shown_s_ = now;
   if (now - figures_s_ >= kFiguresEveryS) {
-    const BoardCounters counters = source_.counters();
+    const ReaderCounters counters = source_.counters();
     state_.frames_per_s = static_cast<double>(frames_ - figures_frames_) / (now - figures_s_);
     state_.median_ms = milliseconds(0.5), state_.p99_ms = milliseconds(0.99);
     state_.lost = counters.missing, state_.dropped = dropped();

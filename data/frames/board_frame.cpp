@@ -1,6 +1,7 @@
 #include "data/frames/board_frame.h"
 
 #include <bit>
+#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
 #include <string>
@@ -53,6 +54,25 @@ void write_frame(const BoardFrame& frame, std::span<std::byte, rig::kFrameBytes>
   for (std::size_t n = 0; n < rig::kFrameSamples; ++n) put(1 + 2 * n, frame.samples[n]);
   put(161, frame.slip);
   out[rig::kFrameBytes - 1] = kFrameTrailer;
+}
+
+std::uint32_t damaged_frames(std::uint64_t discarded) {
+  return static_cast<std::uint32_t>((discarded + rig::kFrameBytes - 1 - 8) / rig::kFrameBytes);
+}
+
+bool JumpDetector::jump(const BoardFrame& frame) {
+  bool far = false;
+  for (int k = 0; k < rig::kTaxels && !first_; ++k) {
+    far = far || std::abs(frame.taxel(k) - last_[static_cast<std::size_t>(k)]) > kLimit;
+  }
+  first_ = false;
+  // Three in a row are a change of the world, not of a byte.
+  const bool flag = far && flagged_ < 3;
+  flagged_ = flag ? flagged_ + 1 : 0;
+  if (!flag) {
+    for (int k = 0; k < rig::kTaxels; ++k) last_[static_cast<std::size_t>(k)] = frame.taxel(k);
+  }
+  return flag;
 }
 
 }  // namespace supertac

@@ -41,4 +41,21 @@ BoardFrame parse_frame(const std::byte* bytes);
 /// Writes the 164 bytes of `frame`. Throws std::invalid_argument for a sample above 4095.
 void write_frame(const BoardFrame& frame, std::span<std::byte, rig::kFrameBytes> out);
 
+/// How many frames the `discarded` bytes between two whole frames were. A byte or two too many or too few are
+/// a cable's errors.
+std::uint32_t damaged_frames(std::uint64_t discarded);
+
+/// Flags physically implausible jumps: a taxel that moves more than 124 ADC steps between two frames. A
+/// flipped bit in a sample passes every check of the format; only this can show it.
+class JumpDetector {
+ public:
+  bool jump(const BoardFrame& frame);
+
+ private:
+  static constexpr int kLimit = 124;  // 0.1 V in a period: at 10 mm/s the finger has moved 0.01 mm
+  std::array<int, rig::kTaxels> last_{};
+  int flagged_ = 0;
+  bool first_ = true;
+};
+
 }  // namespace supertac

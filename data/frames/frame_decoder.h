@@ -1,6 +1,6 @@
 // Finds the board's frames in its byte stream. On a failed check it looks again from the NEXT BYTE: at 1e-3
 // dropped bytes a reader that skips whole frames loses 16-87 % of the undamaged ones, this one none.
-// A flipped bit inside a sample cannot be detected, the format has no checksum; JumpDetector (frame_clock.h)
+// A flipped bit inside a sample cannot be detected, the format has no checksum; JumpDetector (board_frame.h)
 // flags what is physically implausible.
 #pragma once
 

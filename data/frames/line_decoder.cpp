@@ -127,7 +127,12 @@ class RigDecoder : public SensorDecoder {
   void push(std::span<const std::byte> bytes, const Sink& sink) override {
     decoder_.push(bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
       counters_.torn += discarded > 0 ? 1 : 0;
-      sink({taxel_volts(frame), std::nullopt});
+      const auto volts = taxel_volts(frame);
+      sink({.values = volts,
+            .time_s = std::nullopt,
+            .damaged = damaged_frames(discarded),
+            .suspect = discarded > 0,
+            .jump = jumps_.jump(frame)});
     });
     const FrameDecoder::Counters& counted = decoder_.counters();
     counters_.bytes = counted.bytes, counters_.frames = counted.frames;
@@ -136,6 +141,7 @@ class RigDecoder : public SensorDecoder {
 
  private:
   FrameDecoder decoder_;
+  JumpDetector jumps_;
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "hardware/collection/collected_frames.h"
 #include "hardware/ports/errors.h"
@@ -92,31 +93,11 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
   return legs;
 }
 
-// By how much (s) the clock misses the frames first to last.
-double clock_error(const CollectedFrames& all, std::size_t first, std::size_t last) {
-  constexpr int kReads = 8;
-  double worst = 0, earliest = kLargest;
-  int frames = 0, reads = 0;
-  for (std::size_t i = first; i < last; ++i) {
-    if (all.doubt_s[i] > 0) continue;
-    const double time = all.arrival_s[i];
-    earliest = std::min(earliest, time - all.end_s[i]);
-    reads += i + 1 == all.size() || all.arrival_s[i + 1] != time ? 1 : 0;
-    if (++frames < all.steady || reads < kReads) continue;
-    worst = std::max(worst, std::abs(earliest));
-    frames = reads = 0;
-    earliest = kLargest;
-  }
-  return worst;
-}
-
-std::string doubt_of(const ClockFit& clock, double clock_error_s, double speed, const PositionTrack& track) {
+std::string doubt_of(const FrameTimeline& clock, const PositionTrack& track) {
   std::string doubt;
   if (!clock.plausible)
     doubt = "the board's clock says " + format(1e6 * clock.measured_s, 1) + " us a frame, the nominal " +
             format(1e6 * rig::kFramePeriodS, 0) + " are used; ";
-  if (clock_error_s * speed > kTrustedMm)
-    doubt += "frames are up to " + format(clock_error_s, 2) + " s off their clock; ";
   return doubt + track.doubt(kTrustedMm);
 }
 
@@ -124,13 +105,14 @@ CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const Pos
                       double speed) {
   constexpr double kLeastKept = 0.75;
   CollectedPass pass;
-  std::size_t begin = 0, end = 0;
+  std::uint64_t before = 0, last = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const double time = all.end_s[i] - 0.5 * all.clock.period_s;
+    const FrameDate& date = all.clock.dates[i];
+    const double time = date.time_s - 0.5 * all.clock.period_s;
     if (time < track.begin() || time > track.end()) continue;
-    if (end == 0) begin = i;
-    end = i + 1;
-    if (all.doubt_s[i] * speed > kTrustedMm) {
+    if (pass.time_s.empty() && pass.left_out == 0) before = date.missing;
+    last = date.missing;
+    if (date.doubt_s() * speed > kTrustedMm) {
       ++pass.left_out;
       continue;
     }
@@ -142,11 +124,9 @@ CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const Pos
     pass.suspect.push_back(all.suspect[i]);
   }
   pass.speed = speed;
-  const std::size_t checked = std::min(all.size(), end + static_cast<std::size_t>(all.follow));
   pass.measured_speed = track.speed();
-  pass.doubt = doubt_of(all.clock, clock_error(all, begin, checked), speed, track);
-  // A sensor that turns out to be slower than its file says has lost fewer than it seemed.
-  if (end > 0) pass.missing = all.missing[end - 1] - std::min(all.missing[begin], all.missing[end - 1]);
+  pass.doubt = doubt_of(all.clock, track);
+  pass.missing = last - before;
   const std::uint64_t kept = pass.time_s.size(), made = kept + pass.left_out + pass.missing;
   if (static_cast<double>(kept) < kLeastKept * static_cast<double>(made))
     pass.doubt += "only " + std::to_string(kept) + " of " + std::to_string(made) + " frames were kept; ";
@@ -202,15 +182,15 @@ Collection collection_of(const Journal& journal) {
   const std::vector<RecordedLeg> legs = legs_in(journal, collection.complete);
   collection.sensor = sensor_of(journal);
   collection.bed = part_of_header(journal, "bed", bed_of_json);
-  const CollectedFrames all = frames_in(journal, collection.sensor);
+  CollectedFrames all = frames_in(journal, collection.sensor);
   std::vector<Leg> ended;
   for (const RecordedLeg& recorded : legs)
     if (recorded.ended) ended.push_back(recorded.leg);
   const MoveTiming timing = timing_of(ended);
   collection.decoder = all.decoder;
   collection.frames = all.size();
-  collection.missing = all.lost;
-  collection.clock = all.clock;
+  collection.missing = all.clock.missing;
+  collection.resets = all.clock.resets;
   struct Parts {
     PositionTrack track;
     double speed = 0;
@@ -235,6 +215,8 @@ Collection collection_of(const Journal& journal) {
     pass.rejected_positions = part.track.rejected();
     collection.passes.push_back(std::move(pass));
   }
+  all.clock.dates.clear();
+  collection.clock = std::move(all.clock);
   return collection;
 }
 

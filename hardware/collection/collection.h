@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "data/frames/frame_decoder.h"
+#include "data/clock/frame_clock.h"
+#include "data/frames/sensor_decoder.h"
 #include "data/sensors/sensor.h"
-#include "hardware/boards/frame_clock.h"
 #include "hardware/collection/journal.h"
 #include "hardware/collection/position_track.h"
 #include "hardware/printers/bed.h"
@@ -54,9 +54,9 @@ struct Collection {
   std::uint64_t torn_bytes = 0;  ///< of the journal's end
   std::uint64_t lost_bytes = 0;  ///< of the journal, damaged
   double lost_s = 0;
-  FrameDecoder::Counters decoder;
-  std::uint64_t frames = 0, missing = 0;
-  ClockFit clock;
+  SensorDecoder::Counters decoder;
+  std::uint64_t frames = 0, missing = 0, resets = 0;
+  FrameTimeline clock;  ///< without its dates
   std::vector<CollectedPass> passes;
 };
 

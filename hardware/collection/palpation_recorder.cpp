@@ -1,6 +1,5 @@
 #include "hardware/collection/palpation_recorder.h"
 
-#include "hardware/boards/sensor_reader.h"
 #include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
 
@@ -19,8 +18,8 @@ void check_stop(const RecorderSettings& settings, JournalWriter& journal) {
   journal.check();
 }
 
-template <class Reader>
-PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& journal, Reader& board) {
+PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& journal,
+                               SensorReader& board) {
   PalpationObserver observer;
   observer.leg_started = [&](const Leg& leg) { journal.event(leg.accepted_s, event_text(leg, false)); };
   observer.leg_ended = [&](const Leg& leg) { journal.event(leg.ended_s, event_text(leg, true)); };
@@ -38,17 +37,15 @@ PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& 
 
 // Nothing moves before the board has been heard: a wrong port would otherwise be found with the finger on its
 // way. The wait is a fixed one, so that a replay waits the same.
-template <class Reader>
-void hear_board(Reader& board, Printer& printer, const RecorderSettings& settings, JournalWriter& journal) {
-  const bool rig = settings.sensor.frame.kind == FrameKind::board;
-  printer.link().idle(0.1 + (rig ? settings.board.silence_s : SensorReader::silence_s(settings.sensor)));
+void hear_board(SensorReader& board, Printer& printer, const RecorderSettings& settings,
+                JournalWriter& journal) {
+  const double silence_s = settings.reader.silence_s;
+  printer.link().idle(0.1 + (silence_s > 0 ? silence_s : SensorReader::silence_s(settings.sensor)));
   if (settings.replay) return;
   for (int i = 0; i < 100 && !board.next(0.02); ++i) check_stop(settings, journal);  // throws what ended it
 }
 
-/// `board`: a TactileBoard or a SensorReader.
-template <class Reader>
-RecorderReport record(Reader& board, Printer& printer, const RecorderSettings& settings,
+RecorderReport record(SensorReader& board, Printer& printer, const RecorderSettings& settings,
                       JournalWriter& journal) {
   hear_board(board, printer, settings, journal);
   RecorderReport report;
@@ -83,12 +80,8 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
     throw;
   }
   auto port = std::make_unique<CapturedPort>(std::move(board_port), journal, Stream::board);
-  if (settings.sensor.frame.kind == FrameKind::board) {
-    TactileBoard board(std::move(port), settings.board);
-    return record(board, printer, settings, journal);
-  }
-  SensorReader reader({.port = std::move(port)}, settings.sensor);
-  return record(reader, printer, settings, journal);
+  SensorReader board({.port = std::move(port)}, settings.sensor, settings.reader);
+  return record(board, printer, settings, journal);
 }
 
 }  // namespace

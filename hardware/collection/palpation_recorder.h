@@ -7,7 +7,7 @@
 #include <string>
 
 #include "data/sensors/sensor.h"
-#include "hardware/boards/tactile_board.h"
+#include "hardware/boards/sensor_reader.h"
 #include "hardware/collection/capture.h"
 #include "hardware/printers/bed.h"
 
@@ -16,7 +16,7 @@ namespace supertac {
 struct RecorderSettings {
   Bed bed;              ///< the plan, and where the operator confirms the head to be
   Sensor sensor;        ///< what the head carries
-  BoardSettings board;  ///< of the rig's
+  ReaderSettings reader;
   bool home = false;    ///< home instead
   std::string journal;  ///< path; must not exist
   std::string header;   ///< one line that says what is collected
@@ -27,7 +27,7 @@ struct RecorderSettings {
   /// The ports replay a journal: the board's is read to its end, which is no error.
   bool replay = false;
   /// Called for every polled position; for a live line.
-  std::function<void(const Leg&, const Point3&, const BoardCounters&)> progress;
+  std::function<void(const Leg&, const Point3&, const ReaderCounters&)> progress;
 };
 
 struct RecorderReport {

@@ -9,13 +9,14 @@
 #include <numeric>
 #include <typeinfo>
 
+#include "data/clock/frame_clock.h"
+#include "data/frames/board_frame.h"
 #include "data/frames/sensor_decoder.h"
 #include "data/recordings/imports/table_import.h"
 #include "data/recordings/recording.h"
 #include "data/scores/baselines.h"
 #include "data/sensors/rest_tracker.h"
 #include "data/windows/windows.h"
-#include "hardware/boards/sensor_reader.h"
 #include "hardware/ports/errors.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
@@ -188,7 +189,8 @@ void use_sensor(const RandomStream& random) {
       sensor_of_json(json.dump(2, ' ', true, nlohmann::ordered_json::error_handler_t::replace), "sensor");
   sensor.check();
   const auto decoder = make_decoder(sensor);
-  FrameDates dates(sensor);
+  FrameClock clock(clock_settings(sensor));
+  std::vector<FrameDate> dates;
   RestTracker rest(sensor);
   std::vector<float> signals(sensor.array.signals());
   Bytes noise(20'000);
@@ -198,7 +200,9 @@ void use_sensor(const RandomStream& random) {
                              : static_cast<std::byte>(random.bits(100 + i / 7));
   decoder->push(noise, [&](const DecodedFrame& frame) {
     sensor.arrange(frame.values, signals);
-    rest.follow(dates.date(frame.time_s, 1).value_or(0), signals);
+    const FrameArrival arrival{1, 0, frame.time_s};
+    clock.date({&arrival, 1}, dates);
+    rest.follow(dates[0].time_s, signals);
   });
 }
 

@@ -31,7 +31,7 @@ struct Board : SensorSource {
   Board() : SensorSource(rig::kFramePeriodS, 0, true) {}
   std::optional<SensorFrame> next(double) override { return std::nullopt; }
   bool ended() const override { return false; }
-  BoardCounters counters() override { return {}; }
+  ReaderCounters counters() override { return {}; }
   void finish() override {}
 };
 

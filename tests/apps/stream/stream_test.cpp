@@ -127,7 +127,7 @@ class LateBoard : public SensorSource {
     return SensorFrame{frame_++ / 300.0, volts_, monotonic_seconds() - (frame_ > 50 ? 1 : 0)};
   }
   bool ended() const override { return frame_ == 100; }
-  BoardCounters counters() override { return {}; }
+  ReaderCounters counters() override { return {}; }
   void finish() override {}
 
  private:

@@ -71,6 +71,29 @@ TEST(BoardFrame, EveryHighByteIsChecked) {
   }
 }
 
+TEST(BoardFrame, DiscardedBytesAreFramesUpToAFewOfACable) {
+  EXPECT_EQ(damaged_frames(0), 0U);
+  EXPECT_EQ(damaged_frames(1), 0U);
+  EXPECT_EQ(damaged_frames(80), 1U);
+  for (const std::uint64_t bytes : {163U, 164U, 165U}) EXPECT_EQ(damaged_frames(bytes), 1U);
+  EXPECT_EQ(damaged_frames(327), 2U);
+}
+
+TEST(JumpDetector, FlagsAFlippedHighBitOnceAndAcceptsALastingChange) {
+  JumpDetector detector;
+  BoardFrame frame;
+  frame.samples.fill(3000);
+  EXPECT_FALSE(detector.jump(frame));
+  BoardFrame flipped = frame;
+  flipped.samples[10] ^= 0x400;
+  EXPECT_TRUE(detector.jump(flipped));
+  EXPECT_FALSE(detector.jump(frame));
+  frame.samples[5] = 2000;
+  int flagged = 0;
+  for (int i = 0; i < 10; ++i) flagged += detector.jump(frame) ? 1 : 0;
+  EXPECT_EQ(flagged, 3);
+}
+
 TEST(FrameDecoder, PiecesOfAnySizeGiveTheSameFrames) {
   const DamagedStream stream = damaged_stream(200, 0, 0);
   for (const std::size_t piece : {1U, 7U, 163U, 164U, 165U, 4096U}) {

@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "data/frames/frame_decoder.h"
 #include "hardware/collection/collection.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "io/files/file.h"
@@ -310,7 +311,7 @@ TEST(CarriedSensor, NothingMovesBeforeItIsHeard) {
 
 TEST(CarriedSensor, OneThatGoesAwayInContactEndsWithTheFingerUp) {
   CarriedSensor run(mat(true));
-  run.settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters& counters) {
+  run.settings.progress = [&](const Leg& leg, const Point3& at, const ReaderCounters& counters) {
     EXPECT_GT(counters.decoder.frames, 0U);
     if (leg.phase == Phase::slide && at.y > 530) run.rig.unplug_board();
   };

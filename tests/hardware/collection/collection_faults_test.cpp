@@ -26,7 +26,7 @@ struct FaultyCollection {
     settings.journal = folder / "journal";
     settings.header = "fault";
     // Simulated time would otherwise run away from the journal's thread, which would then write all at once.
-    settings.progress = [](const Leg&, const Point3&, const BoardCounters&) {
+    settings.progress = [](const Leg&, const Point3&, const ReaderCounters&) {
       std::this_thread::sleep_for(std::chrono::microseconds(50));
     };
   }

@@ -18,7 +18,7 @@ struct CollectionBench {
   explicit CollectionBench(const RigSettings& rig_settings) : rig(rig_settings) {
     settings.journal = folder / "journal";
     settings.header = "test";
-    settings.board.queue_frames = 16;  // nobody looks at the live frames here
+    settings.reader.queue_frames = 16;  // nobody looks at the live frames here
   }
   RecorderReport record() { return record_palpation(rig.board_port(), rig.printer_port(), settings); }
   Collection collect() { return collection_of(read_journal(settings.journal)); }
@@ -68,7 +68,7 @@ TEST(Collection, NothingMovesBeforeTheBoardIsHeard) {
 TEST(Collection, ABoardThatGoesAwayInContactEndsWithTheFingerUp) {
   CollectionBench bench(running_rig());
   bench.settings.bed.plan.passes = 2;
-  bench.settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters&) {
+  bench.settings.progress = [&](const Leg& leg, const Point3& at, const ReaderCounters&) {
     if (leg.phase == Phase::slide && at.y > 120) bench.rig.unplug_board();
   };
   const RecorderReport report = bench.record();
@@ -88,7 +88,7 @@ TEST(Collection, TheOperatorsStopLiftsTheFinger) {
   CollectionBench bench(running_rig());
   std::atomic<bool> stop{false};
   bench.settings.stop = [&stop] { return stop.load(); };
-  bench.settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters&) {
+  bench.settings.progress = [&](const Leg& leg, const Point3& at, const ReaderCounters&) {
     if (leg.phase == Phase::slide && at.y > 120) stop = true;
   };
   const RecorderReport report = bench.record();

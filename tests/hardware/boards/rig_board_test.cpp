@@ -1,4 +1,4 @@
-#include "hardware/boards/tactile_board.h"
+#include "hardware/boards/sensor_reader.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kPatience = 20;  // seconds of wall time; a loaded machine is no failure
 
-std::uint64_t taken_until_unplugged(TactileBoard& board) {
+std::uint64_t taken_until_unplugged(SensorReader& board) {
   std::uint64_t taken = 0;
   EXPECT_THROW(
       {
@@ -26,7 +26,7 @@ std::uint64_t taken_until_unplugged(TactileBoard& board) {
   return taken;
 }
 
-TEST(TactileBoard, DeliversEveryFrameInOrder) {
+TEST(RigBoard, DeliversEveryFrameInOrder) {
   RigSettings settings = running_rig();
   settings.board.signals = [](double, double, double, double t) {
     std::array<double, 16> volts{};
@@ -34,14 +34,14 @@ TEST(TactileBoard, DeliversEveryFrameInOrder) {
     return volts;
   };
   SimulatedRig rig(settings);
-  TactileBoard board(rig.board_port());
+  SensorReader board({.port = rig.board_port()}, Sensor{});
   rig.run_for(2);
   board.stop();
   std::uint64_t frames = 0;
-  std::uint16_t before = 0;
+  float before = 0;
   while (const auto frame = board.next(0)) {
-    EXPECT_GE(frame->frame.taxel(0), before);
-    before = frame->frame.taxel(0);
+    EXPECT_GE(frame->signals[0], before);
+    before = frame->signals[0];
     EXPECT_FALSE(frame->suspect);
     ++frames;
   }
@@ -49,9 +49,9 @@ TEST(TactileBoard, DeliversEveryFrameInOrder) {
   EXPECT_NEAR(static_cast<double>(frames), 2 / rig::kFramePeriodS, 2);
 }
 
-TEST(TactileBoard, ASlowConsumerLosesTheOldestAndIsTold) {
+TEST(RigBoard, ASlowConsumerLosesTheOldestAndIsTold) {
   SimulatedRig rig(running_rig());
-  TactileBoard board(rig.board_port(), {.queue_frames = 100});
+  SensorReader board({.port = rig.board_port()}, Sensor{}, {.queue_frames = 100});
   rig.run_for(1);
   board.stop();
   std::uint64_t taken = 0;
@@ -103,58 +103,59 @@ std::unique_ptr<Port> hundred_frames() {
   return std::make_unique<ScriptedPort>(reads);
 }
 
-TEST(TactileBoard, AReplaysReaderWaitsForItsConsumer) {
-  TactileBoard board(hundred_frames(), {.queue_frames = 15, .wait_for_consumer = true});
+TEST(RigBoard, AReplaysReaderWaitsForItsConsumer) {
+  SensorReader board({.port = hundred_frames(), .live = false}, Sensor{}, {.queue_frames = 15});
   EXPECT_EQ(taken_until_unplugged(board), 100U);
   EXPECT_EQ(board.counters().dropped, 0U);
 }
 
-TEST(TactileBoard, StoppingDoesNotWaitForAConsumerThatIsGone) {
-  TactileBoard board(hundred_frames(), {.queue_frames = 15, .wait_for_consumer = true});
+TEST(RigBoard, StoppingDoesNotWaitForAConsumerThatIsGone) {
+  SensorReader board({.port = hundred_frames(), .live = false}, Sensor{}, {.queue_frames = 15});
   ASSERT_TRUE(board.next(kPatience));
   board.stop();
   EXPECT_TRUE(board.next(0));
 }
 
-TEST(TactileBoard, FramesThatWaitedFollowTheOneBefore) {
+TEST(RigBoard, FramesThatWaitedFollowTheOneBefore) {
   // Four frames that waited for 4 ms; then two right behind one another, closer than a period allows.
   const double late = 10 + 4.2 * rig::kFramePeriodS;
-  TactileBoard board(std::make_unique<ScriptedPort>(std::vector<ScriptedPort::Read>{
-      {10, some_frames(1)}, {late, some_frames(4)}, {late + 0.001, some_frames(2)}}));
-  const double last = late + 0.001;
-  std::vector<double> expected = {10};
-  for (int i = 1; i <= 4; ++i) expected.push_back(10 + i * rig::kFramePeriodS);
-  expected.push_back((expected.back() + last) / 2);
-  expected.push_back(last);
-  for (const double time : expected) {
+  SensorReader board({.port = std::make_unique<ScriptedPort>(std::vector<ScriptedPort::Read>{
+                          {10, some_frames(1)}, {late, some_frames(4)}, {late + 0.001, some_frames(2)}})},
+                     Sensor{});
+  double before = 10 - rig::kFramePeriodS;
+  for (int i = 0; i < 7; ++i) {
     const auto frame = board.next(kPatience);
     ASSERT_TRUE(frame);
-    EXPECT_NEAR(frame->time_s, time, 1e-9);
+    EXPECT_GT(frame->date.time_s, before);
+    EXPECT_LE(frame->date.time_s, frame->arrival.time_s);
+    before = frame->date.time_s;
   }
 }
 
-TEST(TactileBoard, ReplaysACaptureOfLargerReads) {
+TEST(RigBoard, ReplaysACaptureOfLargerReads) {
   const std::vector<std::byte> bytes = some_frames(60);
-  TactileBoard board(
-      std::make_unique<ReplayPort>(std::vector<JournalRecord>{{RecordKind::clock, 10, {}},
-                                                              {RecordKind::clock, 10, {}},
-                                                              {RecordKind::received, 10.1, bytes},
-                                                              {RecordKind::clock, 10.1, {}}},
-                                   "capture"));
+  SensorReader board(
+      {.port = std::make_unique<ReplayPort>(std::vector<JournalRecord>{{RecordKind::clock, 10, {}},
+                                                                       {RecordKind::clock, 10, {}},
+                                                                       {RecordKind::received, 10.1, bytes},
+                                                                       {RecordKind::clock, 10.1, {}}},
+                                            "capture")},
+      Sensor{});
   EXPECT_EQ(taken_until_unplugged(board), 60U);
 }
 
-TEST(TactileBoard, LostFramesAreCountedAndTheNextIsSuspect) {
+TEST(RigBoard, LostFramesAreCountedAndTheNextIsSuspect) {
   SimulatedRig rig(running_rig({}, {.stall_rate = 0.001, .lost_frame_rate = 0.01}));
-  TactileBoard board(rig.board_port(), {.queue_frames = 100'000});
+  SensorReader board({.port = rig.board_port()}, Sensor{}, {.queue_frames = 100'000});
   rig.run_for(10);
   board.stop();
   const VirtualBoard::Counters truth = rig.world().board().counters();
-  const BoardCounters counters = board.counters();
+  const ReaderCounters counters = board.counters();
   EXPECT_GT(truth.torn, 0U);
   EXPECT_EQ(counters.decoder.frames, truth.sent);
-  // What was lost before the first or after the last frame cannot be seen.
-  EXPECT_NEAR(static_cast<double>(counters.missing), static_cast<double>(truth.lost), 2);
+  // In the first second it is not known yet how late frames come.
+  EXPECT_LE(counters.missing, truth.lost);
+  EXPECT_NEAR(static_cast<double>(counters.missing), static_cast<double>(truth.lost), 30);
   std::uint64_t suspect = 0;
   double before = 0;
   while (const auto frame = board.next(0)) {
@@ -166,18 +167,20 @@ TEST(TactileBoard, LostFramesAreCountedAndTheNextIsSuspect) {
   EXPECT_GE(suspect, truth.torn);
 }
 
-TEST(TactileBoard, UnpluggingIsATypedErrorAfterTheLastFrame) {
+TEST(RigBoard, UnpluggingIsATypedErrorAfterTheLastFrame) {
   SimulatedRig rig(running_rig());
-  TactileBoard board(rig.board_port());
+  SensorReader board({.port = rig.board_port()}, Sensor{});
   rig.run_for(0.1);
   rig.unplug_board();
   EXPECT_EQ(taken_until_unplugged(board), rig.world().board().counters().sent);
 }
 
-TEST(TactileBoard, OverAPseudoTerminalAtTenTimesTheSpeed) {
+TEST(RigBoard, OverAPseudoTerminalAtTenTimesTheSpeed) {
   const TemporaryFolder folder;
   FaultyPtyRig rig(running_rig(), folder / "board", folder / "printer", 10);
-  TactileBoard board(std::make_unique<SerialPort>(folder / "board", SerialSettings{rig::kBoardBaud, 10}));
+  SensorReader board(
+      {.port = std::make_unique<SerialPort>(folder / "board", SerialSettings{rig::kBoardBaud, 10})},
+      Sensor{});
   std::uint64_t frames = 0;
   const double until = monotonic_seconds() + kPatience;
   while (frames < 3000 && monotonic_seconds() < until) frames += board.next(1) ? 1 : 0;
@@ -187,25 +190,28 @@ TEST(TactileBoard, OverAPseudoTerminalAtTenTimesTheSpeed) {
   (void)taken_until_unplugged(board);
 }
 
-TEST(TactileBoard, APrinterAtTheBoardsPortIsRecognised) {
+TEST(RigBoard, APrinterAtTheBoardsPortIsRecognised) {
   const TemporaryFolder folder;
   RigSettings settings;
   settings.printer.boot_s = 0.01;
   settings.printer.heartbeat = true;
   FaultyPtyRig rig(settings, folder / "board", folder / "printer", 20);
-  TactileBoard board(std::make_unique<SerialPort>(folder / "printer", SerialSettings{rig::kBoardBaud, 20}),
-                     {.silence_s = 10});
+  SensorReader board(
+      {.port = std::make_unique<SerialPort>(folder / "printer", SerialSettings{rig::kBoardBaud, 20})},
+      Sensor{}, {.silence_s = 10});
   EXPECT_ERROR((void)board.next(kPatience), WrongDevice,
                "expected a tactile board, found text, as from a printer; exchange the two ports");
 }
 
 // Neither board nor printer: noise without a frame, and a device that talks text to the printer's driver.
-TEST(TactileBoard, AnotherDeviceIsNoBoardAndNoPrinter) {
+TEST(RigBoard, AnotherDeviceIsNoBoardAndNoPrinter) {
   const TemporaryFolder folder;
   const PseudoTerminal device(folder / "port");
   const std::string noise(64, '\xAA'), text = "$GPGGA,123519,4807.038,N\r\n";
   {
-    TactileBoard board(std::make_unique<SerialPort>(folder / "port", SerialSettings{rig::kBoardBaud, 10}));
+    SensorReader board(
+        {.port = std::make_unique<SerialPort>(folder / "port", SerialSettings{rig::kBoardBaud, 10})},
+        Sensor{});
     ASSERT_EQ(write(device.descriptor(), noise.data(), noise.size()), static_cast<ssize_t>(noise.size()));
     EXPECT_ERROR((void)board.next(kPatience), WrongDevice,
                  "found 64 bytes without a frame; choose the board's port (supertac-check machine)");
@@ -219,7 +225,7 @@ TEST(TactileBoard, AnotherDeviceIsNoBoardAndNoPrinter) {
                "printer's port (supertac-check machine) and that its baud rate is 115200");
 }
 
-TEST(TactileBoard, ABoardAtThePrintersPortIsRecognised) {
+TEST(RigBoard, ABoardAtThePrintersPortIsRecognised) {
   const TemporaryFolder folder;
   FaultyPtyRig rig(running_rig(), folder / "board", folder / "printer", 5);
   SerialPort port(folder / "board", {.speedup = 5});

@@ -1,0 +1,76 @@
+// What the live clock and that of a recording have in common: the assumptions of frame_clock.h as numbers,
+// and the period from reads.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+
+#include "data/clock/frame_clock.h"
+
+namespace supertac::clock_model {
+
+// The assumptions of the header.
+constexpr std::size_t kReads = 16;
+constexpr double kReadsS = 0.25, kSteady = 2e-4;
+constexpr double kLateShare = 0.9, kDecades = 13;
+constexpr double kOldestS = 0.6;  // a frame waited no longer before anything is known; stamps jump no farther
+constexpr double kAnyRate = 20;   // of a rate that is a word
+constexpr double kWholePeriod = 0.55;  // what is late by less may be late alone
+constexpr double kNever = 1e9, kMostStampS = 1e11;
+constexpr std::size_t kMostEnds = 512;
+constexpr double kSure = 18;         // median deviations
+constexpr double kSureToLikely = 6;  // three are likely
+constexpr std::size_t kEnough = 64;  // reads that show how late frames come
+constexpr double kDense = 0.1, kFits = 0.01;
+constexpr double kKnown = 0.05;        // a rate that is surer tells what was lost
+constexpr std::size_t kFew = 4;        // reads at the end, which are late alone
+constexpr double kStoredJumpS = 0.1;   // of stamps in a file, where no arrival bears a longer one out
+constexpr double kClockDrifts = 0.01;  // at most, from the port's
+constexpr double kClockOff = 0.5;      // of a device's clock from the port's, as a share
+
+/// Whether these frames, which came so long after a read that had emptied the port, are more than can have
+/// been made since: then they had waited, too, and belong to that read.
+inline bool waited_before(double frames, double seconds, double period_s) {
+  return frames - seconds / period_s > 0.5 + 0.02 * frames;
+}
+
+/// As short as the period may be.
+inline double shortest(const Rate& rate) { return rate.period_s * (1 - std::min(rate.uncertain, 0.95)); }
+
+/// So long (s) must reads go on, whose delays are `jitter_s`, until one was on time: those that come sooner
+/// after one another than they are late are late together.
+inline double span_s(double jitter_s) { return std::clamp(kReads * jitter_s, kReadsS, 8 * kReadsS); }
+
+/// Whether so many reads in a row, `seconds` in all, are late by `rise_s` for good: of those that are later
+/// than `jitter_s`, which one in ten is, one in ten is later than twice that.
+inline bool for_good(std::size_t reads, double seconds, double rise_s, double jitter_s) {
+  const double alone =
+      std::min({static_cast<double>(reads), 1.0 * kReads, 1 + seconds / std::max(jitter_s, 1e-9)});
+  return reads >= kFew && alone * rise_s > kDecades * jitter_s;
+}
+
+/// What a measured period is worth where nothing but the file's rate says whether frames are lost all the
+/// time, which makes it too long: a stated one that is shorter by less than kDense is the period then, and
+/// one that is another's says nothing. Losses show one by one where frames are late by less than a quarter of
+/// a period.
+inline Rate doubted(Rate found, const ClockSettings& settings, double jitter_s) {
+  const double off = found.period_s / settings.period_s;
+  if (settings.tolerance < kKnown || jitter_s < 0.25 * found.period_s || std::abs(off - 1) <= kFits)
+    return found;
+  const bool stated = off > 1 && off * (1 - kDense) < 1;
+  found.uncertain = std::max(found.uncertain, stated ? 1 - 1 / off : kDense);
+  return found;
+}
+
+/// By so much the stamps of a coarse clock wander against the frames.
+inline double grain(double unit_s, double period_s) {
+  return unit_s > 0.25 * period_s && unit_s < kNever ? unit_s : 0;
+}
+
+/// The period, as the earliest of every few reads tell it: the median slope between two that lie as far apart
+/// as makes it surest, at most `farthest` of the whole. A loss spoils the slopes across it only, so that they
+/// may not lie too far apart. kNever uncertain: there are too few reads.
+Rate slope_of(std::span<const ReadEnd> ends, double period_s, double farthest);
+
+}  // namespace supertac::clock_model
