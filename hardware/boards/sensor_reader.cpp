@@ -155,9 +155,9 @@ void SensorReader::check_silence(double time_s) {
     if (never && bytes >= 2)
       throw WrongDevice(
           "port " + port_->name() + ": expected a tactile board, found " +
-          (frames_.text()
-               ? "text, as from a printer; exchange the two ports"
-               : std::to_string(bytes) + " bytes without a frame; choose the board's port (supertac-check machine)"));
+          (frames_.text() ? "text, as from a printer; exchange the two ports"
+                          : std::to_string(bytes) +
+                                " bytes without a frame; choose the board's port (supertac-check machine)"));
     throw BoardSilent("board " + port_->name() + ": expected " + none + "; " +
                       (never ? "is this the board's port (supertac-check machine)? If it is, " : "") +
                       "plug the board out and in again");
