@@ -14,8 +14,8 @@
 namespace supertac {
 
 struct RecorderSettings {
-  Bed bed;              ///< the plan, and where the operator confirms the head to be
-  Sensor sensor;        ///< what the head carries
+  Bed bed;        ///< the plan, and where the operator confirms the head to be
+  Sensor sensor;  ///< what the head carries
   ReaderSettings reader;
   bool home = false;    ///< home instead
   std::string journal;  ///< path; must not exist
