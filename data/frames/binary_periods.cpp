@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "data/frames/binary_columns.h"
+#include "io/numbers/median.h"
 
 namespace supertac {
 namespace {
@@ -31,11 +32,22 @@ struct Lag {
   double share, sigma;  // of the bytes that return
 };
 
-Lag all_of(Bytes bytes, std::size_t period) {
-  const std::size_t count = bytes.size() - period;
-  const double share =
-      static_cast<double>(equal_bytes(&bytes[0], &bytes[period], count)) / static_cast<double>(count);
-  return {period, share, std::sqrt(std::max(share * (1 - share), 1e-6) / static_cast<double>(count))};
+Lag lag_of(std::size_t period, std::size_t equal, std::size_t count) {
+  const double n = static_cast<double>(count), share = static_cast<double>(equal) / n;
+  return {period, share, std::sqrt(std::max(share * (1 - share), 1e-6) / n)};
+}
+
+// Of lags in ascending order those after which notably more returns than usual. A multiple stays only if more
+// returns after it than after what it is a multiple of.
+std::vector<Lag> notable(const std::vector<Lag>& lags, double usual) {
+  const double most = std::ranges::max_element(lags, {}, &Lag::share)->share;
+  std::vector<Lag> kept;
+  for (const Lag& lag : lags)
+    if (lag.share - usual >= kNotable * (most - usual) && std::ranges::none_of(kept, [&](const Lag& k) {
+          return lag.period % k.period == 0 && lag.share < k.share + kSigmas * lag.sigma;
+        }))
+      kept.push_back(lag);
+  return kept;
 }
 
 }  // namespace
@@ -47,8 +59,7 @@ std::vector<std::size_t> periods_of(Bytes bytes) {
   const std::size_t room = bytes.size() - longest;
   for (std::size_t p = kShortest; p <= longest; ++p) {
     if (room <= kBlock * kBlocks) {
-      lags.push_back(
-          {p, static_cast<double>(equal_bytes(&bytes[0], &bytes[p], room)) / static_cast<double>(room), 0});
+      lags.push_back(lag_of(p, equal_bytes(&bytes[0], &bytes[p], room), room));
       continue;
     }
     std::size_t equal = 0;
@@ -56,27 +67,23 @@ std::vector<std::size_t> periods_of(Bytes bytes) {
       const std::size_t from = n * (room - kBlock) / (kBlocks - 1);
       equal += equal_bytes(&bytes[from], &bytes[from + p], kBlock);
     }
-    lags.push_back({p, static_cast<double>(equal) / static_cast<double>(kBlock * kBlocks), 0});
+    lags.push_back(lag_of(p, equal, kBlock * kBlocks));
   }
   std::vector<double> shares;
   for (const Lag& lag : lags) shares.push_back(lag.share);
-  std::ranges::nth_element(shares, shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2));
-  const double usual = shares[shares.size() / 2];
+  const double usual = median(shares);
+  lags = notable(lags, usual);
   std::ranges::sort(lags, std::greater(), &Lag::share);
   if (lags.size() > kShortlist) lags.resize(kShortlist);
-  for (Lag& lag : lags) lag = all_of(bytes, lag.period);
-  const double most = std::ranges::max_element(lags, {}, &Lag::share)->share;
-  // A multiple stays only if more returns after it than after what it is a multiple of.
   std::ranges::sort(lags, {}, &Lag::period);
-  std::vector<Lag> kept;
-  for (const Lag& lag : lags)
-    if (lag.share - usual >= kNotable * (most - usual) && std::ranges::none_of(kept, [&](const Lag& k) {
-          return lag.period % k.period == 0 && lag.share < k.share + kSigmas * lag.sigma;
-        }))
-      kept.push_back(lag);
-  std::ranges::sort(kept, std::greater(), &Lag::share);
+  for (Lag& lag : lags) {
+    const std::size_t count = bytes.size() - lag.period;
+    lag = lag_of(lag.period, equal_bytes(&bytes[0], &bytes[lag.period], count), count);
+  }
+  lags = notable(lags, usual);
+  std::ranges::sort(lags, std::greater(), &Lag::share);
   std::vector<std::size_t> periods;
-  for (const Lag& lag : kept)
+  for (const Lag& lag : lags)
     if (periods.size() < kMostPeriods) periods.push_back(lag.period);
   return periods;
 }
@@ -87,9 +94,7 @@ Stretch stretch_of(Bytes bytes, std::size_t period) {
   for (std::size_t k = 0; k + 1 < rows; ++k)
     shares.push_back(static_cast<double>(equal_bytes(&bytes[k * period], &bytes[(k + 1) * period], period)));
   if (shares.empty()) return {period, 0, 0};
-  std::vector<double> sorted = shares;
-  std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
-  const double enough = 0.6 * sorted[sorted.size() / 2];
+  const double enough = 0.6 * median(std::vector(shares));
   Stretch best{period, 0, 0};
   double sum = 0, most = 0;
   std::size_t begin = 0;

@@ -77,7 +77,7 @@ struct BinaryReading {
 /// the length of the bytes' description (binary_columns.h). `values`: how many a frame has, where that is
 /// known.
 std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::optional<std::size_t> values);
-/// The best reading, where it leads the second by 7 bits (128 to 1); else empty, and `says` names both.
+/// The best reading, where it leads the second by 6 bits (64 to 1); else empty, and `says` names both.
 std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
                                                 std::optional<std::size_t> values,
                                                 std::vector<std::string>& says);

@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // that are looked at: the last
 constexpr std::size_t kLongestHeader = 4, kLongestTrailer = 4, kFewRows = 8, kLongToSkip = 600,
                       kMostSummed = 150'000'000;  // some tenths of a second
-constexpr double kClearLead = 7, kMostLead = 40, kPositive = 12, kLeastExplained = 0.05;
+constexpr double kClearLead = 6, kMostLead = 40, kPositive = 12, kLeastExplained = 0.05;
 constexpr double kNever = BinaryColumns::kNever;
 
 // What people take for headers costs fewer bits than other bytes, and a byte's complement behind it fewer
@@ -28,9 +28,11 @@ double bits_of_header(unsigned char byte, int before) {
   if (before + byte == 255) return 2;
   return std::ranges::find(kOften, byte) != std::end(kOften) ? 4 : byte == 0 ? 12 : 8;
 }
+// Of one before `behind`, below 0 for the last.
 double bits_of_trailer(unsigned char byte, int behind) {
   if (behind + byte == 255) return 2;
-  return byte == '\r' || byte == '\n' ? 1 : byte == 0 ? kNever : 10;
+  const bool ends = (byte == '\r' || byte == '\n') && (behind < 0 || behind == '\r' || behind == '\n');
+  return ends ? 1 : byte == 0 ? kNever : 10;
 }
 
 // People build arrays of some sides more often than of others; kNever where no array has so many values.
@@ -84,7 +86,7 @@ class Search {
         if (trailer > 0) {
           const std::size_t at = start + period_ - trailer;
           trailer_bits += columns_.constant(at) +
-                          bits_of_trailer(columns_.usual(at), trailer == 1 ? 0 : columns_.usual(at + 1)) +
+                          bits_of_trailer(columns_.usual(at), trailer == 1 ? -1 : columns_.usual(at + 1)) +
                           (trailer == 1 ? 3 : 0);
         }
         if (trailer_bits == kNever) break;
@@ -131,7 +133,7 @@ class Search {
       if (header > 0)
         header_bits += columns_.constant(start + header - 1) +
                        bits_of_header(columns_.usual(start + header - 1),
-                                      header == 1 ? 0 : columns_.usual(start + header - 2));
+                                      header == 1 ? -1 : columns_.usual(start + header - 2));
       if (header_bits == kNever) break;
       Ends ends{header, trailer, nullptr,
                 outside_ + trailer_bits + header_bits + kLengths[header] + start_bits_[start]};
