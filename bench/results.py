@@ -30,7 +30,7 @@ TABLES = {
     "docs/map.md": [tables.maps],
     "docs/paper.md": [table1, table1_tests, table2, table2_tests, figure7, figure8, figure10, figure11],
     "bench/results/unseen_plates.md": [tables.left_out],
-    "bench/results/sensors.md": [tables.other_sensors],
+    "bench/results/sensors.md": [tables.other_sensors, tables.few_shot],
     "bench/results/sensor_faults.md": [tables.corruptions, tables.silence],
     "bench/results/speed.md": [tables.speed, tables.tail, tables.cold_start, tables.threads,
                                tables.fast_parts, tables.whole_job, tables.precision],

@@ -155,6 +155,19 @@ def other_sensors():
                  [line(name, method) for name in sets for method in methods if chosen(found, set=name, method=method)])
 
 
+def few_shot():
+    found, full = rows("few_shot.csv"), rows("sensors.csv")
+
+    def line(name):
+        cells = [chosen(found, set=name, groups=groups, method=method) for groups, method in
+                 (("0", "bicubic"), ("0", "back-projection"), *((groups, "network") for groups in ("0", "1", "3", "10")))]
+        cells.append(chosen(full, set=name, seed="0", method="one frame"))
+        return [name] + [f"{mean(of, 'ssim'):.3f}" if of else "" for of in cells]
+
+    return table(["set", "bicubic", "back-projection", "no truth", "1 group", "3", "10", "all"],
+                 [line(name) for name in dict.fromkeys(r["set"] for r in found)])
+
+
 # When the sensor misbehaves -------------------------------------------------------------------------------------------
 
 def corruptions():
