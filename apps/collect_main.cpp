@@ -240,6 +240,7 @@ RecorderReport collect(const Arguments& arguments, std::unique_ptr<Port> board, 
   try {
     RecorderReport report = record_marked(std::move(board), std::move(printer), settings, mark);
     const bool complete = report.outcome.complete;
+    if (!report.kept.empty()) arguments.note("the printer keeps what this run has set: " + report.kept);
     const std::string passes = std::to_string(report.outcome.passes_done) + " passes";
     if (page)
       page->end(complete ? "done: " + passes : "incomplete after " + passes + "; " + report.outcome.note,

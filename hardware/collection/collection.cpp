@@ -186,7 +186,9 @@ Collection collection_of(const Journal& journal) {
   std::vector<Leg> ended;
   for (const RecordedLeg& recorded : legs)
     if (recorded.ended) ended.push_back(recorded.leg);
-  const MoveTiming timing = timing_of(ended);
+  MoveTiming timing = timing_of(ended);
+  for (const auto& [leg, over, samples] : legs)
+    if (leg.speed > 0) timing.faster = std::max(timing.faster, fitted_speed(leg, samples) / leg.speed);
   collection.decoder = all.decoder;
   collection.frames = all.size();
   collection.missing = all.clock.missing;

@@ -50,10 +50,8 @@ RecorderReport record(SensorReader& board, Printer& printer, const RecorderSetti
   hear_board(board, printer, settings, journal);
   RecorderReport report;
   report.outcome = Palpation(printer, settings.bed.plan, observer_for(settings, journal, board)).run();
-  printer.put_back();
-  if (settings.replay) {
-    board.wait_for_end(60);
-  }
+  report.kept = printer.put_back();
+  if (settings.replay) board.wait_for_end(60);
   board.stop();
   report.printer = printer.link().counters();
   if (report.outcome.complete) journal.event(printer.link().port().now(), kRunComplete);

@@ -33,6 +33,7 @@ struct RecorderSettings {
 struct RecorderReport {
   PalpationOutcome outcome;
   MarlinLink::Counters printer;
+  std::string kept;  ///< of the printer's state, as this run has set it
 };
 
 /// Runs the plan and journals everything, in at most three times the plan's time and five minutes. Throws

@@ -12,6 +12,7 @@ namespace {
 
 constexpr int kMostSteps = 20'000;  // of a modelled leg: 100 s every 5 ms
 constexpr double kOffLeg = 0.05;    // mm, beside the leg's line, by rounding
+constexpr double kRounding = 0.01;  // mm, of two positions
 // More than so many samples that do not fit are not noise: a cable that damages 0.2 % of the bytes spoils 3
 // %.
 constexpr double kMostMisfits = 0.1;
@@ -166,6 +167,10 @@ MoveTiming timing_of(std::span<const Leg> ended) {
   return timing;
 }
 
+double fitted_speed(const Leg& leg, const std::vector<PositionSample>& samples) {
+  return speed_of(cruise_of(leg, on_time(samples)));
+}
+
 void PositionTrack::add(double time_s, const Point3& position) {
   if (points_.empty() || time_s > points_.back().time_s) points_.push_back({time_s, position});
 }
@@ -177,9 +182,10 @@ void PositionTrack::distrust(double fastest, const PositionSample& before, const
   const double way = distance(before.position, after.position);
   const double farthest = fastest * (after.time_s - before.time_s);
   const double away = way < farthest                      ? way * (1 - way / farthest)
-                      : reachable(fastest, before, after) ? 0
+                      : reachable(fastest, before, after) ? way - farthest
                                                           : way;
-  doubt_mm_ = std::max(doubt_mm_, away);
+  const double when_s = 0.5 * std::max(before.round_trip_s, after.round_trip_s);
+  doubt_mm_ = std::max(doubt_mm_, away + when_s * fastest + kRounding);
 }
 
 void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
@@ -211,7 +217,7 @@ void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& s
   add(leg.sent_s, leg.from);
   if (samples.empty() && leg.ended_s > 0) return model(leg, timing);
   const std::vector<PositionSample> prompt = on_time(samples);
-  const double fitted = speed_of(cruise_of(leg, prompt)), fastest = std::max(leg.speed, fitted);
+  const double fitted = speed_of(cruise_of(leg, prompt)), fastest = timing.faster * leg.speed;
   const std::vector<PositionSample> chain = chain_of(leg, fastest, prompt);
   rejected_ += samples.size() - chain.size();
   if (prompt.size() >= kFewest)
@@ -221,7 +227,6 @@ void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& s
   for (const PositionSample& sample : chain) {
     add(sample.time_s, sample.position);
     distrust(fastest, before, sample);
-    doubt_mm_ = std::max(doubt_mm_, 0.5 * sample.round_trip_s * fastest);
     before = sample;
   }
   if (leg.ended_s > 0) {

@@ -21,14 +21,17 @@ struct MoveTiming {
   double slowness = 1;        ///< of slides; measured from three on and within 2 %
   double spread_s = 0;        ///< how far the measurements lie apart
   double range_s = 0;  ///< by which delay_s may be wrong, the ramps then being so much shorter or longer
+  double faster = 1;   ///< than ordered, at most, by the positions of any leg
 };
 /// From the short moves in the air that Palpation makes; in their absence from all legs, as if at 500 mm/s^2.
 MoveTiming timing_of(std::span<const Leg> ended);
+/// Of the leg's middle part (mm/s), by its positions; 0: too few.
+double fitted_speed(const Leg& leg, const std::vector<PositionSample>& samples);
 
 /// Where the head was, from the polled positions of one pass. The speed of a leg is the median of its
 /// samples' own. Then the longest chain of samples is kept in which each can be reached from the one before
-/// at this speed, or the ordered one; the others were damaged, late, or misdated while the host stood still.
-/// Between samples the position is linear in time.
+/// at this speed, or the run's fastest; the others were damaged, late, or misdated while the host stood
+/// still. Between samples the position is linear in time.
 class PositionTrack {
  public:
   /// Adds a leg's samples; without samples the leg is modelled as a trapezoid of speed that begins by

@@ -29,11 +29,13 @@ class MachineState {
 
   /// What was changed becomes as it was found, where that was told.
   void put_back(MarlinLink& link);
+  /// What stays as it was set, "plane (G17), ...": what the firmware does not tell, or was not put back.
+  std::string kept() const;
 
  private:
   struct Changed {
-    const char* set;   // of the rule
-    std::string back;  // the command
+    std::string name;  // with the command that set it
+    std::string back;  // commands; empty: nothing told what it was
   };
   std::vector<Changed> changed_;
 };

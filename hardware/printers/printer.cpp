@@ -44,13 +44,14 @@ void Printer::connect() {
   state_.set(link_, false);
 }
 
-void Printer::put_back() {
+std::string Printer::put_back() {
   try {
     link_.set_watch(nullptr);  // nothing ends it but its bound
     link_.give_up_at(link_.port().now() + kStopDeadline);
     if (link_.in_use()) state_.put_back(link_);
   } catch (const HardwareError&) {  // nobody is there to put it back
   }
+  return state_.kept();
 }
 
 void Printer::check_soft_limits(const std::vector<Point3>& targets) {

@@ -36,8 +36,9 @@ class Printer {
   /// Finds the firmware and sets what another job may have left on in it; throws as MarlinLink::connect and
   /// MachineState::set. The origin is unknown then: Marlin cannot tell whether its coordinates mean anything.
   void connect();
-  /// What connect() changed becomes as it was found, where that can be. Throws nothing.
-  void put_back();
+  /// What connect() changed becomes as it was found, where that can be; returns what does not. Throws
+  /// nothing.
+  std::string put_back();
   /// Throws OutsideLimits where the firmware of a homed machine would cut one of these targets.
   void check_soft_limits(const std::vector<Point3>& targets);
 

@@ -127,6 +127,8 @@ std::string PlainRig::answer_to(const std::string& command) {
     const Point3 p = command.ends_with("R") ? motion_.at(now_s_) : motion_.target();
     return "X:" + format(p.x - zero_.x, 2) + " Y:" + format(p.y - zero_.y, 2) +
            " Z:" + format(p.z - zero_.z, 2) + " E:0.00 Count X:0 Y:0 Z:0\n";
+  } else if (code == "M105") {
+    return " T:25.00 /0.00 B:25.00 /0.00 @:0 B@:0\n";
   } else if (code == "M115") {
     return "FIRMWARE_NAME:Marlin 2.1.2 (virtual rig) PROTOCOL_VERSION:1.0\nCap:EMERGENCY_PARSER:1\n";
   } else if (code == "M400" || code == "M410") {

@@ -38,9 +38,8 @@ using FingerSignals = std::function<TaxelVolts(double x, double y, double z, dou
 /// As the board sends them; the other patches are at rest.
 BoardFrame frame_of(const TaxelVolts& volts);
 
-/// The board at its nominal rate. A running Marlin with an emergency parser, the head at rig::kMounted: G0,
-/// G1, G28, G92, M112, M114 (R), M115, M400, M410, without line faults; what else it is asked for it does not
-/// know.
+/// The board at its nominal rate. A running Marlin with an emergency parser, the head at rig::kMounted, that
+/// checks no line and knows G0, G1, G21, G28, G90, G92, M105, M110, M112, M114 (R), M115, M400 and M410.
 class PlainRig : public RigAtPorts {
  public:
   PlainRig(FingerSignals signals, double t);

@@ -35,6 +35,12 @@ std::string check_moves(std::vector<std::string> ran, std::vector<std::string> p
   for (auto* moves : {&ran, &planned})
     for (const std::string& end : measured)
       std::erase_if(*moves, [&](const std::string& move) { return move.ends_with(end); });
+  const auto unknown = std::ranges::find_if(
+      ran, [&](const std::string& move) { return std::ranges::find(planned, move) == planned.end(); });
+  if (ran.size() > planned.size() && unknown != ran.end()) {  // a measured one
+    verdict.altered = *unknown;
+    ran.erase(unknown);
+  }
   std::size_t count = ran.size();
   while (!verdict.complete && count > 0 && ran[count - 1].starts_with("G1 Z")) --count;
   if (count > planned.size() || (verdict.complete && count != planned.size())) {
@@ -138,10 +144,12 @@ std::string check_finger(const PalpationOutcome& outcome, SimulatedRig& rig, con
   return {};
 }
 
-// What a firmware has at the end: all that it tells and takes back.
-LeftOver kept(const VirtualPrinterSettings& printer) {
+// What a firmware has at the end: all but what it is said to keep.
+LeftOver put_back(const VirtualPrinterSettings& printer, const LeftOver& now, const std::string& kept) {
   LeftOver left = printer.left_over;
-  if (printer.firmware != Firmware::klipper) left.relative = false, left.offset = {};
+  if (kept.find("mesh compensation") != std::string::npos) left.mesh_mm = now.mesh_mm;
+  if (kept.find("absolute positions (G90)") != std::string::npos) left.relative = false;
+  if (printer.firmware != Firmware::klipper) left.offset = {};
   if (printer.firmware == Firmware::klipper) left.home_offset = {};
   return left;
 }
@@ -175,7 +183,7 @@ DrawnRun::DrawnRun(std::uint64_t seed) : only_chunks(seed % 10 < 2) {
     left.speed_percent = one_of({100, 100, 50, 150, 300});
     left.flow_percent = one_of({100, 80});
     if (!klipper) left.inches = one_of({0, 0, 1}) > 0;
-    if (!klipper) left.mesh_mm = one_of({0, 0, 0.46});
+    left.mesh_mm = one_of({0, 0, 0.46});
     if (klipper) left.offset = {0, 0, one_of({0, -0.35, 1.2})};
     printer.acceleration = one_of({200, 500, 500, 3000});
     printer.slowness = one_of({1, 1, 1, 1, 0.7, 1.4});
@@ -241,7 +249,8 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
     if (verdict.altered.empty() && verdict.broken.empty())
       verdict.broken = check_box(legs, board, 0.1 + std::abs(rig_settings.printer.left_over.mesh_mm));
     if (verdict.complete && verdict.altered.empty() && verdict.broken.empty() &&
-        rig.world().printer().left_over() != kept(rig_settings.printer))
+        rig.world().printer().left_over() !=
+            put_back(rig_settings.printer, rig.world().printer().left_over(), report.kept))
       verdict.broken = "what was changed in the printer was not put back";
     // Nobody can count frames to one that waited among lost ones.
     const RigFaults& faults = rig_settings.faults;

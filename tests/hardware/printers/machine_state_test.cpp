@@ -17,8 +17,11 @@ TEST(MachineState, EachLeftoverAloneIsSetAndPutBack) {
   const std::vector<LeftOver> marlin = {
       {.inches = true},     {.relative = true}, {.speed_percent = 150},     {.speed_percent = 50},
       {.flow_percent = 80}, {.mesh_mm = 0.46},  {.home_offset = {1, 2, -3}}};
-  const std::vector<LeftOver> klipper = {
-      {.relative = true}, {.speed_percent = 150}, {.flow_percent = 80}, {.offset = {0, 0, -0.35}}};
+  const std::vector<LeftOver> klipper = {{.relative = true},
+                                         {.speed_percent = 150},
+                                         {.flow_percent = 80},
+                                         {.mesh_mm = 0.46},
+                                         {.offset = {0, 0, -0.35}}};
   for (const Firmware firmware : kFirmwares) {
     for (const LeftOver& left : firmware == Firmware::klipper ? klipper : marlin) {
       const FaultVerdict verdict = run_faulty_collection(
@@ -48,13 +51,29 @@ TEST(MachineState, ADamagedAnswerIsNeitherRefusedNorPutBack) {
   }
 }
 
+TEST(MachineState, WhatIsNotPutBackIsSaid) {
+  PrinterBench marlin(running_rig({.left_over = {.speed_percent = 150}}));
+  EXPECT_EQ(marlin.printer.put_back(),
+            "absolute positions (G90), reports of position (M154 S0), reports of temperature (M155 S0)");
+  EXPECT_EQ(marlin.firmware().left_over().speed_percent, 150);
+  PrinterBench klipper(running_rig({.firmware = Firmware::klipper, .left_over = {.mesh_mm = 0.46}}));
+  EXPECT_EQ(klipper.printer.put_back(), "");
+  PrinterBench gone(running_rig({.left_over = {.mesh_mm = 0.46}}));
+  gone.rig.unplug_printer();
+  EXPECT_EQ(gone.printer.put_back(),
+            "absolute positions (G90), reports of position (M154 S0), reports of temperature (M155 S0), mesh "
+            "compensation (M420 S0)");
+}
+
 TEST(MachineState, WhatStaysAnotherIsRefusedByName) {
   SimulatedRig rig(running_rig());
   Tampering port(rig.printer_port());
   port.from_printer.assign(40, {"Bed Leveling OFF", "Bed Leveling ON"});
   Printer printer(port);
-  EXPECT_ERROR(printer.connect(), PrinterRefused,
-               "expected its mesh compensation at 'OFF', found 'ON' after M420 S0; set it by hand");
+  EXPECT_ERROR(
+      printer.connect(), PrinterRefused,
+      "expected its mesh compensation at 'Bed Leveling OFF', found 'Bed Leveling ON' after M420 S0; set it "
+      "by hand");
 }
 
 TEST(MachineState, AHomeOffsetIsRefusedByNameWhereItShiftsTheBed) {

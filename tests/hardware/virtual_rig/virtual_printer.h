@@ -141,6 +141,7 @@ class VirtualPrinter {
   Point3 offset_, base_;  // logical = physical - offset - base; base_: Klipper's own
   LeftOver left_over_, saved_;
   Point3 saved_base_;
+  double kept_mesh_mm_ = 0;           // of Klipper's profile
   double ready_s_ = 0;                // of Klipper
   Point3 steps_zero_;                 // where Count is 0; G92 does not move it
   std::deque<std::string> received_;  // whole lines not yet looked at

@@ -85,12 +85,23 @@ bool VirtualPrinter::run_klipper(const std::string& command, double t) {
   } else if (command.starts_with("SAVE_GCODE_STATE")) {
     saved_ = left_over_, saved_base_ = base_;
   } else if (command.starts_with("RESTORE_GCODE_STATE")) {
+    saved_.mesh_mm = left_over_.mesh_mm;  // no part of it
     left_over_ = saved_, base_ = saved_base_;
   } else if (command.starts_with("SET_GCODE_OFFSET")) {
     base_ = {base_.x - offset.x, base_.y - offset.y, base_.z - offset.z};
     offset = {};
   } else if (command == "BED_MESH_CLEAR") {
     left_over_.mesh_mm = 0;
+  } else if (command == "BED_MESH_PROFILE SAVE=supertac") {
+    const bool probed = left_over_.mesh_mm != 0;
+    if (probed) kept_mesh_mm_ = left_over_.mesh_mm;
+    output_ += probed
+                   ? "// Bed Mesh state has been saved to profile [supertac]\n// for the current session.\n"
+                   : "// Unable to save to profile [supertac], the bed has not been probed\n";
+  } else if (command == "BED_MESH_PROFILE LOAD=supertac") {
+    left_over_.mesh_mm = kept_mesh_mm_;
+  } else if (command == "BED_MESH_PROFILE REMOVE=supertac") {
+    kept_mesh_mm_ = 0;
   } else if (command == "GET_POSITION") {
     output_ += "// gcode homing: X:" + format(offset.x, 6) + " Y:" + format(offset.y, 6) +
                " Z:" + format(offset.z, 6) + "\n";
