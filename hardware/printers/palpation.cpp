@@ -7,12 +7,11 @@
 namespace supertac {
 namespace {
 
-constexpr double kProgressDeadline = 6;
-constexpr double kStopWithin = 1.6;  // in the air: of the 2 s in which Ctrl-C ends a program
-constexpr double kLiftWithin = 60;   // in contact
-constexpr double kLiftAgain = 0.5;   // s, behind a lift that failed
-constexpr int kMeasuredPairs = 3;    // of short moves to and fro, at the slide's speed and a slow one
-constexpr double kSlowMmS = 2;       // whose ramps take next to no time
+constexpr double kLiftWithin = 60;  // in contact
+constexpr const char* kHalted = "the firmware halted and takes no more commands; lift the finger by hand";
+constexpr double kLiftAgain = 0.5;  // s, behind a lift that failed
+constexpr int kMeasuredPairs = 3;   // of short moves to and fro, at the slide's speed and a slow one
+constexpr double kSlowMmS = 2;      // whose ramps take next to no time
 constexpr int kClaims = 3;  // of having arrived at once, before a firmware is taken for one without M114 R
 
 }  // namespace
@@ -186,7 +185,7 @@ void Palpation::run_leg(Leg& leg) {
 // M154's report in the place of a damaged answer.
 void Palpation::follow(const Leg& leg) {
   const double length = distance(leg.from, leg.to);
-  const double until = leg.accepted_s + 1.5 * ordered_s(leg) + kProgressDeadline;
+  const double until = leg.accepted_s + printer_.longest_s();
   double next = leg.accepted_s;
   int claims = 0;
   PositionSample before{leg.sent_s, 0, leg.from};
@@ -222,7 +221,7 @@ void Palpation::recover(PalpationOutcome& outcome) {
     std::rethrow_exception(outcome.error);
   } catch (const PrinterHalted&) {
     outcome.finger = Finger::stopped;
-    outcome.note = "the firmware halted and takes no more commands; lift the finger by hand";
+    outcome.note = kHalted;
     return;
   } catch (const PrinterReset&) {
     // Should it only have said so, it still moves: a stop does no harm to one that has just started.
@@ -245,8 +244,9 @@ void Palpation::recover(PalpationOutcome& outcome) {
         until = now + (in_contact_ ? kLiftWithin + 1.5 * longest_leg_s_ : kStopWithin);
         link.give_up_at(until);
         link.answer_pauses();
-      } else if (now >= until) {
-        return;
+      } else if (now >= until) {  // what cannot be lifted stands at least
+        link.give_up_at(now + kLiftWithin);
+        if (!printer_.emergency_stop().confirmed) return;
       } else {
         link.idle(kLiftAgain);
       }
@@ -264,7 +264,7 @@ void Palpation::recover(PalpationOutcome& outcome) {
       return;
     } catch (const PrinterHalted&) {
       outcome.finger = Finger::stopped;
-      outcome.note = "the firmware halted and takes no more commands; lift the finger by hand";
+      outcome.note = kHalted;
       return;
     } catch (const ReplayDiverged&) {
       return;

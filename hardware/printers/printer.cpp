@@ -11,10 +11,9 @@ namespace supertac {
 namespace {
 
 constexpr double kToleranceMm = 0.05;
+constexpr int kAttempts = 6;  // at an answer that is not damaged
 constexpr double kHomeDeadline = 180, kStopDeadline = 3, kPollDeadline = 0.25;
-constexpr double kStopWithin = 1.6;  // of the 2 s in which Ctrl-C ends a program; M410 takes one of them
-constexpr double kPrompt = 0.1;      // of an answer, where it must come before the head starts
-constexpr double kLiftBeforeHome = 10;
+constexpr double kPrompt = 0.1;    // of an answer, where it must come before the head starts
 constexpr double kMoveMargin = 8;  // start delay, acceleration, and a firmware that is slower than ordered
 
 std::string coordinates(const Point3& p) {
@@ -57,16 +56,15 @@ std::string Printer::put_back() {
 void Printer::check_soft_limits(const std::vector<Point3>& targets) {
   if (origin_ != Origin::homed) return;
   const std::optional<SoftLimits> soft = soft_limits_of(link_);
-  for (const Point3& p : targets) {
-    const auto inside = [](double v, double low, double high) {
-      return v > low - kToleranceMm && v < high + kToleranceMm;
-    };
+  const auto inside = [](double v, double low, double high) {
+    return v > low - kToleranceMm && v < high + kToleranceMm;
+  };
+  for (const Point3& p : targets)
     if (soft && !(inside(p.x, soft->low.x, soft->high.x) && inside(p.y, soft->low.y, soft->high.y) &&
                   inside(p.z, soft->low.z, soft->high.z)))
       throw OutsideLimits("printer " + link_.port().name() +
                           ": its soft endstops (M211) would cut the way to " + describe(p) + "; it says " +
                           in_quotes(soft->text) + ", correct the plan or the firmware's limits");
-  }
 }
 
 void Printer::home() {
@@ -75,7 +73,7 @@ void Printer::home() {
     // Klipper moves nothing before it knows where it is: it is told a place, for the lift alone.
     if (link_.capabilities().klipper) link_.command("SET_KINEMATIC_POSITION Z=0");
     const Point3 here = agreed_position();
-    raise(here, here.z + kLiftBeforeHome);  // wherever z is, first away from the plate
+    raise(here, here.z + 2 * rig::kLiftMm);  // wherever z is, first away from the plate
     link_.command("G28", kHomeDeadline);
     state_.set(link_, true);  // which homing may undo
   } catch (const PrinterRefused&) {
@@ -91,8 +89,9 @@ void Printer::home() {
   }
   target_ = agreed_position();
   origin_ = Origin::homed;
-  const double missing = limits_.clearance_z() - target_.z;
-  if (missing > 0) lift(missing);
+  if (target_.z >= limits_.clearance_z()) return;
+  raise(target_, limits_.clearance_z());
+  finish_move();
 }
 
 void Printer::confirm_origin(const Point3& here) {
@@ -103,11 +102,7 @@ void Printer::confirm_origin(const Point3& here) {
                   " Z=" + format(here.z, 3));
   link_.command(origin_command(here));
   target_ = here;
-  Point3 found = queue_position();
-  for (int attempt = 0; attempt < 2 && distance(found, here) > kToleranceMm; ++attempt) {
-    link_.settle();
-    found = queue_position();  // the answer may have been damaged
-  }
+  const Point3 found = agreed_position();
   if (distance(found, here) > kToleranceMm) {
     throw PositionError("printer: after G92 expected " + describe(here) + ", found " + describe(found) +
                         "; confirm the origin again");
@@ -136,7 +131,6 @@ MarlinLink::Answer Printer::start_move(const Point3& target, double speed_mm_s) 
 // Klipper checks no line: a damaged one runs as what it has become. Where its queue ends is asked before the
 // head starts, a quarter of a second later.
 MarlinLink::Answer Printer::order(const std::string& move, const Point3& from, const Point3& to) {
-  constexpr int kAttempts = 8;
   if (!link_.capabilities().klipper) return link_.command(move);
   Point3 end = from;
   for (int attempt = 0; attempt < kAttempts && distance(end, from) <= kToleranceMm; ++attempt) {
@@ -152,8 +146,10 @@ MarlinLink::Answer Printer::order(const std::string& move, const Point3& from, c
                       "), check the cable");
 }
 
+double Printer::longest_s() const { return 1.5 * expected_seconds_ + kMoveMargin; }
+
 double Printer::finish_move() {
-  const double end = link_.command("M400", 1.5 * expected_seconds_ + kMoveMargin).answered_s;
+  const double end = link_.command("M400", longest_s()).answered_s;
   expected_seconds_ = 0;
   Point3 found;
   for (int attempt = 0; attempt < 3; ++attempt) {
@@ -179,18 +175,18 @@ std::optional<PositionSample> Printer::sample_position(double deadline_s) {
 }
 
 Point3 Printer::queue_position(double deadline_s) {
-  for (int attempt = 0; attempt < 5; ++attempt) {
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
     const MarlinLink::Answer answer = link_.command("M114", deadline_s);
     if (const Reply* reply = position_in(answer)) return reply->position;
     link_.settle();
   }
-  throw PrinterSilent("printer " + link_.port().name() +
-                      ": expected a position from M114, found none in 5 answers");
+  throw PrinterSilent("printer " + link_.port().name() + ": expected a position from M114, found none in " +
+                      std::to_string(kAttempts) + " answers");
 }
 
 Point3 Printer::agreed_position(double deadline_s) {
   Point3 before = queue_position(deadline_s);
-  for (int attempt = 0; attempt < 6; ++attempt) {
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
     const Point3 now = queue_position(deadline_s);
     if (distance(before, now) < 0.005) return now;
     before = now;
@@ -224,7 +220,7 @@ Printer::Stop Printer::quick_stop() {
     link_.settle();
     const bool stands = ends_its_move || stands_still();
     // The position of the queue is that of the head only once nothing moves any more.
-    link_.command("M400", stop.ahead_of_queue ? kStopDeadline : 1.5 * expected_seconds_ + kMoveMargin);
+    link_.command("M400", stop.ahead_of_queue ? kStopDeadline : longest_s());
     target_ = agreed_position();
     expected_seconds_ = 0;
     stop.confirmed = stands;
@@ -271,19 +267,13 @@ void Printer::raise(const Point3& from, double z) {
   expected_seconds_ += std::abs(z - from.z) / rig::kLiftMmS + 0.5;
 }
 
-void Printer::lift(double mm) {
-  const Point3 here = agreed_position();
-  raise(here, std::min(here.z + mm, limits_.high.z));
-  finish_move();
-}
-
 void Printer::lift_out(double z) {
   const bool stops = link_.capabilities().quick_stop();
   constexpr double kHeldByStop = 1.3;  // M410 holds Marlin for a second
   if (stops) link_.emergency("M410");
-  link_.abandon(stops ? 1 : 0, stops ? kHeldByStop : 1.5 * expected_seconds_ + kMoveMargin);
+  link_.abandon(stops ? 1 : 0, stops ? kHeldByStop : longest_s());
   raise(stops ? Point3{target_.x, target_.y, limits_.low.z} : agreed_position(), std::min(z, limits_.high.z));
-  link_.command("M400", 1.5 * expected_seconds_ + kMoveMargin);
+  link_.command("M400", longest_s());
   const Point3 found = agreed_position();
   if (std::abs(found.z - target_.z) > kToleranceMm)
     throw PositionError("printer " + link_.port().name() + ": expected the finger lifted to Z" +

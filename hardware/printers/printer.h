@@ -10,6 +10,8 @@
 
 namespace supertac {
 
+constexpr double kStopWithin = 1.6;  ///< s, of the 2 in which Ctrl-C ends a program; M410 takes one of them
+
 /// The line that makes a straight move, and the one that says where the head is.
 std::string move_command(const Point3& target, double speed_mm_s);
 std::string origin_command(const Point3& here);
@@ -59,6 +61,9 @@ class Printer {
   /// they differ by more than the tolerance three times running. Returns the time at which M400 was answered.
   double finish_move();
 
+  /// Bounds what finish_move() may take now (s).
+  double longest_s() const;
+
   /// M114 R; empty when the answer was damaged or later than `deadline_s` (0: 0.25 s).
   std::optional<PositionSample> sample_position(double deadline_s = 0);
   /// M114: the end of the queue, which is the head's position only after M400.
@@ -72,8 +77,6 @@ class Printer {
   Stop quick_stop();
   /// M112: kills the firmware; afterwards only a reset helps.
   Stop emergency_stop();
-  /// Raises the finger by `mm` from wherever it is. Throws when that could not be verified.
-  void lift(double mm);
   /// The way out of contact: stops a firmware that has a quick stop, and raises the finger to `z` before
   /// anything is asked. Throws when that could not be verified.
   void lift_out(double z);

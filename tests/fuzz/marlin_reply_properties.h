@@ -67,7 +67,7 @@ inline void check_marlin_replies(std::span<const std::byte> input) {
     (void)printer.sample_position();
     printer.finish_move();
     (void)printer.quick_stop();
-    printer.lift(5);
+    printer.lift_out(135);
   } catch (const HardwareError&) {
   }
   if (printer.link().halted()) {
