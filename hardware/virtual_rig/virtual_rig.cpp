@@ -86,9 +86,20 @@ void PlainRig::to_printer(std::span<const std::byte> bytes) {
 
 void PlainRig::take_line(const std::string& line) {
   std::string command = line.substr(0, line.find('*'));
-  if (command[0] == 'N') command.erase(0, std::min(command.size(), command.find(' ') + 1));
+  std::optional<double> number;
+  if (command[0] == 'N') {
+    number = parameter(" " + command, 'N');
+    command.erase(0, std::min(command.size(), command.find(' ') + 1));
+  }
   if (command.empty()) return;
   const std::string code = code_of(command);
+  if (number && code != "M110" && *number != line_ + 1) {
+    if (*number != line_ && *number != line_ - 1)  // a repetition
+      output_ += "Error:Line Number is not Last Line Number+1, Last Line: " + format(line_) +
+                 "\nResend: " + format(line_ + 1) + "\nok\n";
+    return;
+  }
+  line_ = number.value_or(line_);
   if (code == "M410") {  // acts ahead of the queue, and holds what comes behind it
     motion_.stop(now_s_);
     held_until_s_ = now_s_;

@@ -39,7 +39,8 @@ using FingerSignals = std::function<TaxelVolts(double x, double y, double z, dou
 BoardFrame frame_of(const TaxelVolts& volts);
 
 /// The board at its nominal rate. A running Marlin with an emergency parser, the head at rig::kMounted, that
-/// checks no line and knows G0, G1, G21, G28, G90, G92, M105, M110, M112, M114 (R), M115, M400 and M410.
+/// checks the numbers of lines alone and knows G0, G1, G21, G28, G90, G92, M105, M110, M112, M114 (R), M115,
+/// M400 and M410.
 class PlainRig : public RigAtPorts {
  public:
   PlainRig(FingerSignals signals, double t);
@@ -59,10 +60,10 @@ class PlainRig : public RigAtPorts {
 
   FingerSignals signals_;
   MotionQueue motion_;
-  double start_s_, now_s_, held_until_s_ = -1;  // by the command that runs
-  Point3 zero_;                                 // logical = physical - zero
-  double feed_mm_s_ = rig::kSlideMmS;
-  std::deque<std::string> waiting_;  // commands
+  double start_s_, now_s_, held_until_s_ = -1;    // by the command that runs
+  Point3 zero_;                                   // logical = physical - zero
+  double feed_mm_s_ = rig::kSlideMmS, line_ = 0;  // the last number
+  std::deque<std::string> waiting_;               // commands
   std::string partial_, output_;
   std::uint64_t frames_ = 0;
   bool held_ = false, halted_ = false;

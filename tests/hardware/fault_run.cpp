@@ -144,11 +144,17 @@ std::string check_finger(const PalpationOutcome& outcome, SimulatedRig& rig, con
   return {};
 }
 
-// What a firmware has at the end: all but what it is said to keep.
-LeftOver put_back(const VirtualPrinterSettings& printer, const LeftOver& now, const std::string& kept) {
+// What a firmware has at the end: all but what it is said to keep; nothing when it restarted before the run.
+LeftOver put_back(const RigSettings& rig, const LeftOver& now, const std::string& kept) {
+  const VirtualPrinterSettings& printer = rig.printer;
   LeftOver left = printer.left_over;
-  if (kept.find("mesh compensation") != std::string::npos) left.mesh_mm = now.mesh_mm;
-  if (kept.find("absolute positions (G90)") != std::string::npos) left.relative = false;
+  if (rig.faults.reset_rate > 0 && now == LeftOver{}) return now;
+  const auto stays = [&](const char* name) { return kept.find(name) != std::string::npos; };
+  if (stays("mesh compensation")) left.mesh_mm = now.mesh_mm;
+  if (stays("absolute positions")) left.relative = false;
+  if (stays("unit of lengths")) left.inches = false;
+  if (stays("speed factor")) left.speed_percent = 100;
+  if (stays("flow factor")) left.flow_percent = 100;
   if (printer.firmware != Firmware::klipper) left.offset = {};
   if (printer.firmware == Firmware::klipper) left.home_offset = {};
   return left;
@@ -250,7 +256,7 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
       verdict.broken = check_box(legs, board, 0.1 + std::abs(rig_settings.printer.left_over.mesh_mm));
     if (verdict.complete && verdict.altered.empty() && verdict.broken.empty() &&
         rig.world().printer().left_over() !=
-            put_back(rig_settings.printer, rig.world().printer().left_over(), report.kept))
+            put_back(rig_settings, rig.world().printer().left_over(), report.kept))
       verdict.broken = "what was changed in the printer was not put back";
     // Nobody can count frames to one that waited among lost ones.
     const RigFaults& faults = rig_settings.faults;
