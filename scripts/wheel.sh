@@ -11,7 +11,7 @@ tools="$PWD/build-wheel"
 rm -rf "$tools/plain"
 "$tools/bin/pip" -q wheel --no-deps --wheel-dir "$tools/plain" ./python
 rm -f dist/supertac-*.whl
-"$tools/bin/auditwheel" -q repair --strip --wheel-dir dist "$tools"/plain/supertac-*.whl
+"$tools/bin/auditwheel" repair --strip --wheel-dir dist "$tools"/plain/supertac-*.whl >"$tools/log" 2>&1 || { cat "$tools/log"; exit 1; }
 wheel=$(ls dist/supertac-*.whl)
 echo "$wheel: $(($(stat -c %s "$wheel") / 1000)) kB"
 for root in "$@"; do
