@@ -7,6 +7,13 @@ namespace supertac {
 
 using namespace clock_model;
 
+double finer_unit(double stamp_s, double unit_s) {
+  constexpr double kFinestS = 1e-9, kWhole = 1e-3;
+  const auto whole = [](double units) { return std::abs(units - std::round(units)) < kWhole; };
+  while (unit_s > kFinestS && std::abs(stamp_s) < kMostStampS && !whole(stamp_s / unit_s)) unit_s /= 10;
+  return unit_s;
+}
+
 double DeviceStamps::step_to(double raw_s, double from_s, double most_s) const {
   const double step = raw_s - from_s, range = settings_.stamp_range_s;
   if (range <= 0) return step;
@@ -19,6 +26,7 @@ DeviceStamps::Reading DeviceStamps::read(double stamp_s, double elapsed_s, doubl
     elapsed_s_ += elapsed_s, now_s_ += elapsed_s, least_lag_s_ += kClockDrifts * elapsed_s;
   ++since_;
   if (!(std::abs(stamp_s) < kMostStampS)) return {};
+  settings_.stamp_unit_s = finer_unit(stamp_s, settings_.stamp_unit_s);
   if (believed_ == 0) return accept(stamp_s, stamp_s, {});
   const double least = settings_.stamp_unit_s > 0.25 * period_s ? 0 : 1e-9;
   // As late as the frames are, so far may a stamp be ahead.

@@ -223,11 +223,13 @@ void FrameClock::date(std::span<const FrameArrival> frames, std::vector<FrameDat
 }
 
 FrameDate FrameClock::by_stamp(const FrameArrival& frame) {
-  const double step = 1 + frame.damaged, period = rate_.period_s, unit = settings_.stamp_unit_s;
+  const double step = 1 + frame.damaged, period = rate_.period_s;
   const double elapsed_s = first_ ? 0 : frame.time_s - arrived_s_;
   damaged_ += frame.damaged, number_ += step, unbelieved_s_ += settings_.stored ? 0 : elapsed_s;
   const DeviceStamps::Reading reading =
       frame.stamp_s ? stamps_.read(*frame.stamp_s, elapsed_s, period) : DeviceStamps::Reading{};
+  settings_.stamp_unit_s = stamps_.unit_s();
+  const double unit = settings_.stamp_unit_s;
   if (!reading.time_s) {
     if (first_) return dated(0, 0, 0);
     const double due = last_.time_s + period * step;

@@ -65,6 +65,9 @@ struct FrameDate {
   double doubt_s() const { return std::max(to_s - time_s, time_s - from_s); }
 };
 
+/// The unit of stamps, `unit_s` or less: a clock in seconds may have decimals.
+double finer_unit(double stamp_s, double unit_s);
+
 /// The stamps of one device in the order they come, as seconds that never run over or fall.
 class DeviceStamps {
  public:
@@ -78,6 +81,7 @@ class DeviceStamps {
   };
   /// `elapsed_s`: from the arrival of the frame before to that of this one.
   Reading read(double stamp_s, double elapsed_s, double period_s);
+  double unit_s() const { return settings_.stamp_unit_s; }
 
  private:
   struct Mark {

@@ -240,7 +240,10 @@ FrameTimeline timeline_of(const ClockSettings& settings, std::span<const FrameAr
   FrameTimeline timeline;
   timeline.period_s = timeline.measured_s = settings.period_s;
   const std::size_t n = arrivals.size();
-  const double unit = settings.stamp_unit_s, nan = std::numeric_limits<double>::quiet_NaN();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  double unit = settings.stamp_unit_s;
+  for (const FrameArrival& arrival : arrivals)
+    if (unit > 0 && arrival.stamp_s) unit = finer_unit(*arrival.stamp_s, unit);
   std::vector<double> x(n), arrived(n), stamped(n, nan);
   std::vector<std::size_t> begins = {0};  // of what the device ran through
   DeviceStamps stamps(settings);

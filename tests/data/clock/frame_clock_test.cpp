@@ -208,6 +208,26 @@ TEST(FrameClock, ALoadedHostLosesNothingThatArrived) {
   }
 }
 
+TEST(FrameClock, AClockInSecondsMayHaveDecimals) {
+  for (const double stated_s : {0.005, 0.01, 0.02}) {
+    const ClockSettings settings{.period_s = stated_s, .tolerance = 20, .stamp_unit_s = 1};
+    FrameClock clock(settings);
+    std::vector<FrameArrival> arrivals;
+    std::vector<FrameDate> dates;
+    for (int i = 0; i < 2000; ++i) {
+      const double made_s = 5.0033 + 0.0101 * i;
+      arrivals.push_back({.time_s = made_s + 0.3, .stamp_s = std::round(1e3 * made_s) / 1e3});
+      clock.date(std::span(arrivals).last(1), dates);
+      ASSERT_NEAR(dates[0].time_s, made_s, 1.1e-3) << "frame " << i << ", stated " << stated_s;
+    }
+    const FrameTimeline timeline = timeline_of(settings, arrivals);
+    for (std::size_t i = 0; i < arrivals.size(); ++i)
+      ASSERT_NEAR(timeline.dates[i].time_s, arrivals[i].time_s, 2e-3)
+          << "frame " << i << ", stated " << stated_s;
+    EXPECT_EQ(timeline.missing, 0U);
+  }
+}
+
 TEST(FrameClock, EveryLiveDateIsWithinItsBound) { study(live_score); }
 TEST(FrameClock, EveryDateOfARecordingIsWithinItsBound) { study(whole_score); }
 
