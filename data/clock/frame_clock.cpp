@@ -245,8 +245,10 @@ FrameDate FrameClock::by_stamp(const FrameArrival& frame) {
   if (coarse || off > -0.5 * period) take(number_, number_, stamp_s + unit);
   const double due = coarse && !first_ ? last_.time_s + period * step : stamp_s;
   const double unsure = std::min(rate_.uncertain, 1.0) * std::abs(went);
-  return dated(std::clamp(due, stamp_s, stamp_s + (coarse ? unit : 0)), stamp_s - std::max(0.0, off) - unsure,
-               stamp_s + unit + std::max(0.0, -off) + unsure);
+  // The stamp before says by how much this one is off, up to a unit, and whole periods may have been lost.
+  const double too_early = off > 0 ? std::abs(off - period * std::round(off / period)) : -off;
+  return dated(std::clamp(due, stamp_s, stamp_s + (coarse ? unit : 0)),
+               stamp_s - std::max(0.0, off) - unit - unsure, stamp_s + 2 * unit + too_early + unsure);
 }
 
 }  // namespace supertac

@@ -197,9 +197,9 @@ std::vector<double> too_short(std::span<const double> x, std::span<const double>
   return off;
 }
 
-// The intervals of stamps. One that is whole periods from a neighbour is right up to what is left over; one
-// that is so from none may be wrong by all that lies between them. One that is finer than the frames is the
-// date.
+// The intervals of stamps. One that is whole periods from a neighbour is right up to what is left over and a
+// unit; one that is so from none may be wrong by all that lies between them. One that is finer than the
+// frames is the date.
 void bound_by_stamps(std::span<const double> x, std::span<const double> stamp_s, double unit_s, Tube& tube) {
   const double period = tube.rate.period_s, unsure = std::min(tube.rate.uncertain, 1.0) * period;
   std::vector<std::size_t> at;
@@ -229,8 +229,8 @@ void bound_by_stamps(std::span<const double> x, std::span<const double> stamp_s,
                                             : late[k];
     const double too_late = std::max({0.0, before, -after}), too_early = std::max({0.0, -before, after});
     if (unit_s <= 0.25 * period) tube.dates[i] = stamp_s[i] - unit_s;
-    tube.from[i] = std::min(tube.from[i], tube.dates[i] - too_late - unsure * frames);
-    tube.to[i] = std::max(tube.to[i], tube.dates[i] + unit_s + too_early + unsure * frames);
+    tube.from[i] = std::min(tube.from[i], tube.dates[i] - unit_s - too_late - unsure * frames);
+    tube.to[i] = std::max(tube.to[i], tube.dates[i] + 2 * unit_s + too_early + unsure * frames);
   }
 }
 
