@@ -229,8 +229,8 @@ void bound_by_stamps(std::span<const double> x, std::span<const double> stamp_s,
                                             : late[k];
     const double too_late = std::max({0.0, before, -after}), too_early = std::max({0.0, -before, after});
     if (unit_s <= 0.25 * period) tube.dates[i] = stamp_s[i] - unit_s;
-    tube.from[i] = std::min(tube.from[i], tube.dates[i] - unit_s - too_late - unsure * frames);
-    tube.to[i] = std::max(tube.to[i], tube.dates[i] + 2 * unit_s + too_early + unsure * frames);
+    tube.from[i] = std::min(tube.from[i], tube.dates[i] - too_late - unsure * frames);
+    tube.to[i] = std::max(tube.to[i], tube.dates[i] + unit_s + too_early + unsure * frames);
   }
 }
 
