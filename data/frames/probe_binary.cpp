@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // that are looked at: the last
 constexpr std::size_t kLongestHeader = 4, kLongestTrailer = 4, kFewRows = 8, kLongToSkip = 600,
                       kMostSummed = 150'000'000;  // some tenths of a second
-constexpr double kClearLead = 6, kMostLead = 40, kPositive = 12, kLeastExplained = 0.05;
+constexpr double kClearLead = 7, kMostLead = 40, kPositive = 12, kLeastExplained = 0.05;
 constexpr double kNever = BinaryColumns::kNever;
 
 // What people take for headers costs fewer bits than other bytes, and a byte's complement behind it fewer
@@ -269,7 +269,7 @@ class Search {
       if (checksum_bytes(f.checksum) > 1 && ends.checksum->big_endian != f.big_endian)
         f.checksum_big_endian = ends.checksum->big_endian;
     }
-    r.values = count, r.bits = bits;
+    r.values = count, r.period = period_, r.bits = bits;
     return r;
   }
 
@@ -364,20 +364,23 @@ std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
     return std::nullopt;
   }
   const BinaryReading& best = found[0];
-  const double lead = found.size() > 1 ? found[1].bits - best.bits : kMostLead;
+  const auto part = std::ranges::find_if(
+      found, [&](const BinaryReading& r) { return r.period < best.period && best.period % r.period == 0; });
+  const BinaryReading* second = part != found.end() ? &*part : found.size() > 1 ? &found[1] : nullptr;
+  const double lead = part != found.end() ? 0 : second != nullptr ? second->bits - best.bits : kMostLead;
   if (lead < kClearLead || best.unknown || best.mixed || best.sign_unsure) {
     says.push_back("it may be: " + best.text());
     if (best.mixed) says.push_back("but its fields have two byte orders, which no sensor's file can say");
     if (best.sign_unsure) says.push_back("but whether its numbers have a sign cannot be told");
     if (best.unknown)
       says.push_back("but some bytes have no meaning that is known, such as another checksum");
-    if (lead < kClearLead) says.push_back("or as well: " + found[1].text());
+    if (lead < kClearLead) says.push_back("or as well: " + second->text());
     says.push_back(
         "nothing is drafted: press many taxels while it listens, longer (--seconds), or write the file");
     return std::nullopt;
   }
   says.push_back("binary: " + best.text());
-  if (found.size() > 1) says.push_back("the next best reading: " + found[1].text());
+  if (second != nullptr) says.push_back("the next best reading: " + second->text());
   if (best.unit_assumed)
     says.push_back("assumed: its clock counts units of " + format(best.format.time->unit_s) +
                    " s; a file does not tell; set \"frame.time.unit\"");
