@@ -10,19 +10,16 @@
 //
 // What is assumed:
 //   - The period is within `tolerance` of the stated one, and steady to 2e-4 over a recording. A stated one
-//   that fits
-//     what comes to 1 % is right. Where none does, and losses do not show one by one, fewer than a tenth of
-//     the frames are lost all the time: by so much the period may be too long.
+//     that fits what comes to 1 % is right. Where none does, and losses do not show one by one, fewer than a
+//     tenth of the frames are lost all the time: by so much the period may be too long.
 //   - One read in ten is later than J, of these one in ten later than 2 J, and so on; reads that are J apart
-//   are late
-//     each on its own. J is measured. What this lets happen once in 1e13 times does not happen: of n reads in
-//     a row one at least is late by no more than 13 J / n.
+//     are late each on its own. J is measured. What this lets happen once in 1e13 times does not happen: of n
+//     reads in a row one at least is late by no more than 13 J / n.
 //   - A read takes all that has come, and what waits is handed over at once: a frame was not made before the
-//   read in
-//     front of it, but for as much as frames of this stream have been late without that.
+//     read in front of it, but for as much as frames of this stream have been late without that. A read of
+//     several frames beside lost ones may not have: a buffer was full, and another may stand behind it.
 //   - A first read of one frame had been waited for. How long those of a larger one have waited nobody knows:
-//   their
-//     intervals have no begin.
+//     their intervals have no begin.
 //   - A stamp that is wrong has neighbours that are right.
 // What is promised: the time at which a frame was made, up to the one smallest delay of the stream, lies in
 // the frame's interval; no frame is counted as lost that arrived, but by FrameClock for as long as all frames

@@ -135,9 +135,11 @@ class TubeMaker {
     std::vector<double> slacks(slack_.begin(), slack_.end());
     const double usual_slack = slacks.empty() ? 0 : median(slacks);
     std::array<Window, 2> windows = {Window{kFew, kFew * jitter_s_}, Window{kReads, span_s(jitter_s_)}};
-    std::size_t b = 0;
+    std::size_t b = 0, emptied = 0;  // the read of frame i; the one in front of it that took all
     for (std::size_t i = 0; i < n; ++i) {
-      while (b + 1 < bursts_.size() && x_[i] > bursts_[b].last) ++b;
+      for (; b + 1 < bursts_.size() && x_[i] > bursts_[b].last; ++b)
+        if (b == 0 || bursts_[b].last == bursts_[b].first || (lost_[b] - lost_[b - 1]) * period <= jitter_s_)
+          emptied = b;
       if (std::isnan(y_[i])) {
         if (b > 0) tube_.lost[i] = static_cast<std::uint64_t>(lost_[b - 1]);
         continue;
@@ -148,7 +150,7 @@ class TubeMaker {
       double& from = tube_.from[i];
       from = y_[i] - width_s_;
       if (b > 0)
-        from = std::max(from, bursts_[b - 1].time_s - 2 * most_waited_s_ - slack(i) +
+        from = std::max(from, bursts_[emptied].time_s - 2 * most_waited_s_ - slack(i) +
                                   (period - drift) * (x_[i] - burst.first));
       else if (burst.last == burst.first)  // it was waited for
         from = std::max(from, tube_.to[i] - kDecades * jitter_s_);

@@ -179,6 +179,29 @@ TEST(FrameTimeline, CountsEveryLostFrameAndDatesItWhereItWas) {
       }
 }
 
+// An adapter hands on a chunk each 0.1 s. The host stands still: the port keeps 49 frames of what comes
+// meanwhile and the adapter 25 later ones, which the read behind brings, as if they were new.
+TEST(FrameTimeline, WhatASecondBufferKeptIsNoTrustedFrame) {
+  constexpr double kPeriodS = rig::kFramePeriodS, kChunkS = 0.1;
+  std::vector<FrameArrival> arrivals;
+  std::vector<double> made_s;
+  const auto made_until = [](int chunk) { return static_cast<int>(kChunkS * chunk / kPeriodS); };
+  const auto bring = [&](int from, int to, int chunk) {
+    for (int i = from; i < to; ++i)
+      arrivals.push_back({.time_s = kChunkS * chunk}), made_s.push_back(kPeriodS * (i + 1));
+  };
+  for (int chunk = 10; chunk < 40; ++chunk) bring(made_until(chunk), made_until(chunk + 1), chunk + 1);
+  const int begin = made_until(40);
+  bring(begin, begin + 49, 47);
+  bring(begin + 100, begin + 125, 48);
+  for (int chunk = 48; chunk < 80; ++chunk) bring(made_until(chunk), made_until(chunk + 1), chunk + 1);
+  const FrameTimeline timeline = timeline_of({}, arrivals);
+  for (std::size_t i = 0; i < arrivals.size(); ++i) {
+    EXPECT_LE(timeline.dates[i].from_s, made_s[i] + 1e-3) << i;
+    EXPECT_GE(timeline.dates[i].to_s, made_s[i] - 1e-3) << i;
+  }
+}
+
 TEST(FrameTimeline, SaysWhenABoardIsNoneOfTheRigs) {
   for (const double share : {0.98, 0.996, 1.004, 1.02})
     EXPECT_EQ(timeline_of({}, board_stream(share * rig::kFramePeriodS, 0, 0).arrivals).plausible,
