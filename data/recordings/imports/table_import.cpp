@@ -125,7 +125,9 @@ void spread_equal_stamps(std::vector<double>& time_s, double step) {
 /// did not.
 double ran_over(double before, double now, double most) {
   for (const double range : {65536.0, 4294967296.0})
-    if (before < range && now >= 0 && now < before && now + range - before < most) return range;
+    for (const double lowest : {0.0, -range / 2})  // unsigned, signed
+      if (before < lowest + range && now >= lowest && now < before && now + range - before < most)
+        return range;
   return 0;
 }
 

@@ -147,11 +147,17 @@ TEST_F(TableImport, ACoarseClockIsSpread) {
 }
 
 TEST_F(TableImport, ACounterMayRunOver) {
-  std::string text;
-  for (std::uint64_t i = 0; i < 60; ++i)
-    text += std::to_string((65'000 + 10 * i) % 65'536) + ",50,60,70,80\n";
-  const Recording r = import(file(text), "time=0:ms");
-  for (std::size_t i = 1; i < 60; ++i) EXPECT_NEAR(r.time_s[i] - r.time_s[i - 1], 0.01, 1e-9) << i;
+  for (const std::int64_t range : {std::int64_t{1} << 16, std::int64_t{1} << 32}) {
+    for (const std::int64_t top : {range, range / 2}) {  // unsigned, signed
+      std::string text;
+      for (std::int64_t i = 0; i < 60; ++i) {
+        const std::int64_t t = top - 300 + 10 * i;
+        text += std::to_string(t < top ? t : t - range) + ",50,60,70,80\n";
+      }
+      const Recording r = import(file(text), "time=0:ms");
+      for (std::size_t i = 1; i < 60; ++i) EXPECT_NEAR(r.time_s[i] - r.time_s[i - 1], 0.01, 1e-9) << top;
+    }
+  }
   std::string restarted;  // 13 s would have gone by
   for (int i = 0; i < 60; ++i) restarted += std::to_string((i < 30 ? 52'000 : 0) + 10 * i) + ",50,60,70,80\n";
   expect_refusal(file(restarted), "time=0:ms", "column 0 as time falls in line 31");
