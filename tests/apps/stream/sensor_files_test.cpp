@@ -167,7 +167,7 @@ TEST_P(SensorFile, IsProbedViewedRecordedAndReadBack) {
   Sensor sensor = example(GetParam());
   sensor.body.skin_mm = 2, sensor.body.knee = 0.5;
   const bool slow = sensor.rate_hz < 10;
-  const std::string seconds = slow ? "6" : "2.5";
+  const std::string seconds = slow ? "6" : "4";
   const FakeDevice device(sensor);
   sensor.port = device.port();
 
