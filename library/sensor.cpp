@@ -93,7 +93,7 @@ int supertac_sensor_lost(supertac_sensor* sensor, unsigned long long* missing, u
            "supertac_sensor_lost: a pointer is NULL");
     expect(sensor->reader != nullptr, "supertac_sensor_lost: call supertac_sensor_start first");
     const ReaderCounters counters = sensor->reader->counters();
-    *missing = counters.missing + counters.damaged, *dropped = counters.dropped;
+    *missing = counters.missing, *dropped = counters.dropped;
     return 0;
   });
 }

@@ -208,7 +208,7 @@ TEST_F(Library, ReadsASensorToItsEnd) {
   write_file(sensor_file, R"({"name": "mat", "rows": 1, "columns": 3, "pitch_mm": 5, "unit": "counts",
 "pressed": "higher", "range": [0, 100], "rate_hz": 100, "port": "missing.csv", "order": [2, 1, 0], "dead": [1],
 "frame": {"kind": "text", "separator": ",", "time": {"column": 0, "unit": "ms"}}})");
-  write_file(lines, "0,1,2,3\n10,4,5,100\n20,x,8,9\n30,10,11,12\n");
+  write_file(lines, "0,1,2,3\n10,4,5,100\n20,x,8,9\n30,nan,8,9\n40,10,11,12\n");
   supertac_sensor* const sensor = supertac_sensor_new(sensor_file.c_str());
   ASSERT_NE(sensor, nullptr) << supertac_error();
   supertac_sensor_description about{};
@@ -237,7 +237,11 @@ TEST_F(Library, ReadsASensorToItsEnd) {
   EXPECT_EQ(seen, (std::vector<std::vector<float>>{{3, 2, 1}, {100, 52, 4}, {12, 11, 10}}));
   ASSERT_EQ(times.size(), 3U);
   EXPECT_NEAR(times[1] - times[0], 0.01, 1e-6);
-  EXPECT_NEAR(times[2] - times[0], 0.03, 1e-6);
+  EXPECT_NEAR(times[2] - times[0], 0.04, 1e-6);
+  unsigned long long missing = 0, dropped = 1;
+  ASSERT_EQ(supertac_sensor_lost(sensor, &missing, &dropped), 0);
+  EXPECT_EQ(missing, 1U);  // five stamps do not tell yet that one line was no frame
+  EXPECT_EQ(dropped, 0U);
   EXPECT_EQ(supertac_sensor_start(sensor, lines.c_str()), -1);  // it is being read
   supertac_sensor_free(sensor);
   supertac_sensor_free(nullptr);
