@@ -18,10 +18,8 @@ constexpr double kRowsAlike = 0.9;  // of the variance stay within rows that are
 constexpr double kRowsDiffer =
     0.7;  // of the variance of all: what stays within the rows, where rows are taxels
 
-std::string number(double value) { return format(value); }
-
 struct Reading {
-  char separator, decimal;
+  char separator;
   std::size_t slots = 0, numbers = 0;  // of the usual line: cells or numbers; of these no words
   double share = 0;                    // of the lines, weighted by their length, that are such
 };
@@ -37,7 +35,7 @@ Reading read_as(const std::vector<std::string>& lines, char separator, char deci
     counts[{slots.size(), numbers}] += static_cast<double>(numbers);
     all += static_cast<double>(numbers);
   }
-  Reading reading{.separator = separator, .decimal = decimal};
+  Reading reading{.separator = separator};
   if (counts.empty()) return reading;
   const auto usual = std::ranges::max_element(counts, {}, [](const auto& c) { return c.second; });
   reading.slots = usual->first.first, reading.numbers = usual->first.second,
@@ -96,17 +94,9 @@ Commas commas_of(const std::vector<std::string>& lines) {
   return commas;
 }
 
-/// What begins a line: its template before the first number.
-std::string beginning(const std::string& line, const Reading& reading) {
-  const std::string_view content = behind_stamp(line);
-  const auto slots = slots_of(content, 0, reading.decimal);
-  return std::string(
-      trimmed(slots.empty() ? content : content.substr(0, slots[0].text.data() - content.data())));
-}
-
 struct Kind {
-  std::string begins;
-  std::size_t count = 0;
+  std::string begins;     // the template before the first number
+  std::size_t count = 0;  // of numbers
   auto operator<=>(const Kind&) const = default;
 };
 
@@ -152,36 +142,47 @@ bool has_own_clock(const std::vector<std::vector<double>>& rows) {
   return false;
 }
 
-/// Fills lines_per_frame and prefix.
-void find_period(const std::vector<std::string>& lines, const Reading& reading, TextGrammar& grammar) {
-  FrameFormat& format = grammar.format;
+/// Lines as their kinds (of empty ones in a row the first), and those with the usual count of numbers.
+struct Survey {
   std::vector<Kind> kinds;
+  std::size_t usual = 0;
   std::vector<std::vector<double>> rows;  // of the usual lines, all numbers
-  std::vector<std::string> starts;        // of these
+  std::vector<std::string> starts;        // of these, up to the first number and what is behind it
+  bool own = false;                       // each is a frame of its own
+};
+
+Survey survey_of(const std::vector<std::string>& lines, char decimal) {
+  Survey survey;
   std::map<std::size_t, std::size_t> counts;
-  for (const std::string& line : lines) ++counts[slots_of(behind_stamp(line), 0, reading.decimal).size()];
-  std::size_t usual = 0, most = 0;
+  for (const std::string& line : lines) ++counts[slots_of(behind_stamp(line), 0, decimal).size()];
+  std::size_t most = 0;
   for (const auto& [count, of] : counts)
-    if (count * of > most) most = count * of, usual = count;
+    if (count * of > most) most = count * of, survey.usual = count;
   bool stamped = true;
   for (const std::string& line : lines) {
     const std::string_view content = behind_stamp(line);
     if (content.empty()) {
-      if (!kinds.empty() && kinds.back() == Kind{}) continue;
-      kinds.emplace_back();
+      if (survey.kinds.empty() || survey.kinds.back() != Kind{}) survey.kinds.emplace_back();
       continue;
     }
-    const auto slots = slots_of(content, 0, reading.decimal);
-    kinds.push_back({beginning(line, reading), slots.size()});
-    if (slots.empty() || slots.size() != usual) continue;
+    const auto slots = slots_of(content, 0, decimal);
+    const std::size_t first = slots.empty() ? content.size() : slots[0].text.data() - content.data();
+    survey.kinds.push_back({std::string(trimmed(content.substr(0, first))), slots.size()});
+    if (slots.empty() || slots.size() != survey.usual) continue;
     stamped = stamped && content.size() != line.size() && line.find("->") == std::string::npos;
-    starts.emplace_back(content.substr(0, slots[0].text.data() + slots[0].text.size() - content.data() + 1));
-    rows.emplace_back();
-    for (const TextSlot& slot : slots) rows.back().push_back(slot.value);
+    survey.starts.emplace_back(content.substr(0, first + slots[0].text.size() + 1));
+    survey.rows.emplace_back();
+    for (const TextSlot& slot : slots) survey.rows.back().push_back(slot.value);
   }
+  survey.own = (stamped && !survey.rows.empty()) || has_own_clock(survey.rows);
+  return survey;
+}
+
+/// Fills lines_per_frame and prefix where kinds of lines take turns; false where nothing is settled so.
+bool find_turns(const Survey& survey, TextGrammar& grammar) {
+  const std::vector<Kind>& kinds = survey.kinds;
   std::map<Kind, std::vector<std::size_t>> places;
   for (std::size_t i = 0; i < kinds.size(); ++i) places[kinds[i]].push_back(i);
-  const bool own = (stamped && !rows.empty()) || has_own_clock(rows);
   std::size_t period = 1;
   for (const auto& [kind, of] : places)
     if (const auto gap = usual_gap(of);
@@ -192,43 +193,44 @@ void find_period(const std::vector<std::string>& lines, const Reading& reading, 
   for (const auto& [kind, of] : places)
     if (period > 1 && usual_gap(of) == period && 2 * of.size() * period > kinds.size())
       anchors.push_back(kind);
-  if (!anchors.empty() && !own) {
-    if (std::ranges::find(anchors, Kind{}) != anchors.end()) {
-      format.lines_per_frame = static_cast<int>(period) - 1;
-      return;
-    }
-    // A line unlike the others begins a frame; else the first label.
-    const auto natural = [](const Kind& kind) {
-      const std::size_t number = kind.begins.find_first_of("0123456789");
-      const double value =
-          number == std::string::npos
-              ? 0
-              : parse_double(
-                    kind.begins.substr(number, kind.begins.find_first_not_of("0123456789", number) - number))
-                    .value_or(0);
-      return std::tuple(kind.count, kind.begins.substr(0, number), value, kind.begins);
-    };
-    std::vector<Kind> odd;
-    for (const Kind& kind : anchors)
-      if (kind.count != usual && !kind.begins.empty()) odd.push_back(kind);
-    const Kind first = odd.size() == 1 ? odd[0] : *std::ranges::min_element(anchors, {}, natural);
-    if (!first.begins.empty()) {
-      if (odd.size() == 1 && odd[0].count == 0 && period > 2) {
-        const double within = within_rows(rows, period - 1, 0);
-        if (within > kRowsAlike) return;  // a remark now and then
-        if (within > kRowsDiffer)
-          grammar.doubt = "a line " + in_quotes(first.begins) + " after every " + std::to_string(period - 1) +
-                          " lines, which do not differ: each line may be a frame, or all of them one";
-      }
-      format.lines_per_frame = static_cast<int>(period), format.prefix = first.begins;
-      return;
-    }
+  if (anchors.empty()) return false;
+  if (std::ranges::find(anchors, Kind{}) != anchors.end()) {
+    grammar.format.lines_per_frame = static_cast<int>(period) - 1;
+    return true;
+  }
+  // A line unlike the others begins a frame; else the first label.
+  const auto natural = [](const Kind& kind) {
+    const std::size_t number = std::min(kind.begins.find_first_of("0123456789"), kind.begins.size());
+    const std::string digits =
+        kind.begins.substr(number, kind.begins.find_first_not_of("0123456789", number) - number);
+    return std::tuple(kind.count, kind.begins.substr(0, number), parse_double(digits).value_or(0),
+                      kind.begins);
+  };
+  std::vector<Kind> odd;
+  for (const Kind& kind : anchors)
+    if (kind.count != survey.usual && !kind.begins.empty()) odd.push_back(kind);
+  const Kind first = odd.size() == 1 ? odd[0] : *std::ranges::min_element(anchors, {}, natural);
+  if (first.begins.empty()) {
     grammar.doubt = std::to_string(period) + " kinds of lines take turns, with " +
                     joined(anchors, " and ", [](const Kind& kind) { return std::to_string(kind.count); }) +
                     " numbers, and no mark says where a frame begins: they may be one quantity or several";
+    return false;
   }
-  if (own || usual < 2 || rows.size() < 6) return;
-  // The first number of a line counts the rows of a frame, or the frames.
+  if (odd.size() == 1 && odd[0].count == 0 && period > 2) {
+    const double within = within_rows(survey.rows, period - 1, 0);
+    if (within > kRowsAlike) return true;  // a remark now and then
+    if (within > kRowsDiffer)
+      grammar.doubt = "a line " + in_quotes(first.begins) + " after every " + std::to_string(period - 1) +
+                      " lines, which do not differ: each line may be a frame, or all of them one";
+  }
+  grammar.format.lines_per_frame = static_cast<int>(period), grammar.format.prefix = first.begins;
+  return true;
+}
+
+/// The same where the first number of a line counts the rows of a frame; it may count the frames.
+void find_index(const Survey& survey, TextGrammar& grammar) {
+  const std::vector<std::vector<double>>& rows = survey.rows;
+  if (survey.usual < 2 || rows.size() < 6) return;
   std::vector<double> index;
   for (const auto& row : rows) index.push_back(row[0]);
   const double low = std::ranges::min(index), high = std::ranges::max(index);
@@ -245,18 +247,18 @@ void find_period(const std::vector<std::string>& lines, const Reading& reading, 
   for (std::size_t i = 0; i < rows.size(); ++i) values[i].assign(rows[i].begin() + 1, rows[i].end());
   const double within = within_rows(values, static_cast<std::size_t>(size), first);
   const std::string what =
-      "the first number of a line runs from " + number(low) + " to " + number(high) + ", ";
-  const bool named = rows.size() > first && starts[first].find("ow") != std::string::npos;
-  if (!named && usual > 2 && within > kRowsDiffer)
+      "the first number of a line runs from " + format(low) + " to " + format(high) + ", ";
+  const bool named = survey.starts[first].find("ow") != std::string::npos;
+  if (!named && survey.usual > 2 && within > kRowsDiffer)
     grammar.doubt =
         what +
         "but what follows does not differ between them: it may be a counter of frames that are a line each, "
         "or the row of a frame of " +
-        number(size) + " lines";
-  format.lines_per_frame = static_cast<int>(size);
+        format(size) + " lines";
+  grammar.format.lines_per_frame = static_cast<int>(size);
   for (std::size_t i = 0; i < rows.size(); ++i)
-    if (index[i] == low) format.prefix = trimmed(starts[i]);
-  grammar.says.push_back(what + "so a frame has " + number(size) + " lines, each with its row");
+    if (index[i] == low) grammar.format.prefix = trimmed(survey.starts[i]);
+  grammar.says.push_back(what + "so a frame has " + format(size) + " lines, each with its row");
 }
 
 /// Whether most lines end in a hexadecimal checksum, and in which.
@@ -326,7 +328,8 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
   }
   if (reading.numbers == 0 || reading.share < kUsual) return std::nullopt;
   grammar.format.separator = reading.separator, grammar.format.decimal = decimal;
-  find_period(lines, reading, grammar);
+  if (const Survey survey = survey_of(lines, decimal); !survey.own && !find_turns(survey, grammar))
+    find_index(survey, grammar);
   if (commas == Commas::doubt)
     grammar.doubt = "a comma between digits, as in " + in_quotes(lines[lines.size() / 2].substr(0, 40)) +
                     ", may be the point of one number or stand between two (\"decimal\" says which)";
@@ -342,9 +345,10 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
     std::vector<std::string> before, text;
   };
   std::vector<Frame> all;
+  double written = 0;                              // lines that are not empty
   std::map<std::vector<bool>, std::size_t> forms;  // which cells are words
   for (const std::string& line : lines) {
-    grammar.lines += !line.empty();
+    written += line.empty() ? 0 : 1;
     if (frames.push(line) != TextFrames::Result::frame) continue;
     Frame frame;
     for (const TextSlot& slot : frames.slots()) {
@@ -361,11 +365,10 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
         return f.second * static_cast<std::size_t>(std::ranges::count(f.first, false));
       })->first;
   std::erase_if(all, [&](const Frame& frame) { return frame.words != usual; });
-  if (all.empty() || static_cast<double>(all.size()) * grammar.format.lines_per_frame <
-                         0.4 * static_cast<double>(grammar.lines))
+  if (all.empty() || static_cast<double>(all.size()) * grammar.format.lines_per_frame < 0.4 * written)
     return std::nullopt;
   const Frame& sample = all[all.size() / 2];
-  grammar.frames = all.size(), grammar.words = usual, grammar.wall = sample.wall;
+  grammar.words = usual, grammar.wall = sample.wall;
   grammar.before = sample.before, grammar.sample = sample.text;
   grammar.columns.resize(usual.size()), grammar.decimals.resize(usual.size());
   for (const Frame& frame : all)

@@ -49,7 +49,6 @@ class TextFrames {
   /// What `line` completed; slots() are then its numbers. `torn`: lines that are no frame.
   Result push(std::string_view line);
   const std::vector<TextSlot>& slots() const { return slots_; }
-  const std::vector<std::string>& lines() const { return lines_; }
 
  private:
   FrameFormat format_;
@@ -72,7 +71,6 @@ struct TextGrammar {
   std::vector<std::string> before, sample;   ///< of each slot: template before it, how it is written
   std::vector<int> decimals;                 ///< behind the point, at most; of each slot
   std::vector<bool> words, wall;             ///< of each slot
-  std::size_t frames = 0, lines = 0;         ///< read, of so many that are not empty
   std::vector<std::string> says;
   std::string doubt;  ///< two readings that explain the same; empty where there is one
 };
