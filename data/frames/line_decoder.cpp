@@ -80,7 +80,7 @@ class TextDecoder : public LineDecoder {
     if (slots.size() != count_ + format_.skip.size() + (format_.time ? 1 : 0)) return Line::torn;
     for (std::size_t c = 0; c < slots.size(); ++c) {
       const int column = static_cast<int>(c);
-      if (std::ranges::find(format_.skip, column) != format_.skip.end()) continue;
+      if (std::ranges::binary_search(format_.skip, column)) continue;
       if (slots[c].words) return Line::torn;
       if (format_.time && format_.time->column == column)
         frame.time_s = slots[c].value * format_.time->unit_s;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "data/frames/binary_decoder.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
@@ -138,16 +139,13 @@ std::optional<double> number_at(std::string_view text, std::size_t& i, char deci
 /// A cell as a number, with nothing around it.
 TextSlot cell_of(std::string_view cell, char decimal) {
   TextSlot slot{.value = kNaN, .text = cell, .before = {}};
-  std::size_t end = 0;
-  if (cell.empty() || no_value(cell)) return slot;
-  if (const auto seconds = wall_time(cell, end); seconds && end == cell.size()) {
+  std::size_t end = 0, wall_end = 0;
+  if (const auto number = number_at(cell, end, decimal); number && end == cell.size())
+    slot.value = *number;
+  else if (const auto seconds = wall_time(cell, wall_end); seconds && wall_end == cell.size())
     slot.value = *seconds, slot.wall = true;
-    return slot;
-  }
-  end = 0;
-  const auto number = number_at(cell, end, decimal);
-  slot.words = !number || end != cell.size();
-  if (!slot.words) slot.value = *number;
+  else
+    slot.words = !cell.empty() && !no_value(cell);
   return slot;
 }
 
@@ -155,7 +153,7 @@ bool lists(char c) { return c == ',' || c == ';' || c == '|'; }
 
 /// A mark that stands for no value, such as "nan", or nothing between two commas, from i on; i behind it.
 bool none_at(std::string_view line, std::size_t& i) {
-  if (at(line, i) == ',' || at(line, i) == ';' || at(line, i) == '|') {
+  if (lists(at(line, i))) {
     const std::size_t next = line.find_first_not_of(' ', i + 1);
     if (next == std::string_view::npos || line[next] != line[i]) return false;
     i = next;  // the second one begins what follows
@@ -183,6 +181,7 @@ bool none_at(std::string_view line, std::size_t& i) {
 
 std::string clean_line(std::string_view line) {
   std::string clean;
+  clean.reserve(line.size());
   for (std::size_t i = 0; i < line.size(); ++i) {
     if (line[i] == '\0') continue;
     if (line.substr(i, 3) == "\xEF\xBB\xBF") {
@@ -264,22 +263,7 @@ std::optional<TextChecksum> checksum_of(std::string_view line) {
 }
 
 unsigned TextChecksum::computed(const std::string& kind) const {
-  unsigned value = kind.starts_with("crc16") ? 0xFFFF : 0;
-  for (const char c : line.substr(line.starts_with('$') ? 1 : 0)) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (kind == "xor8") value ^= byte;
-    if (kind == "sum8") value = (value + byte) & 0xFF;
-    if (kind == "crc16-modbus") {
-      value ^= byte;
-      for (int bit = 0; bit < 8; ++bit) value = value >> 1 ^ ((value & 1) != 0 ? 0xA001U : 0U);
-    }
-    if (kind == "crc16-ccitt") {
-      value ^= unsigned{byte} << 8;
-      for (int bit = 0; bit < 8; ++bit)
-        value = (value << 1 ^ ((value & 0x8000) != 0 ? 0x1021U : 0U)) & 0xFFFF;
-    }
-  }
-  return value;
+  return checksum_of(kind, std::as_bytes(std::span(line.substr(line.starts_with('$') ? 1 : 0))));
 }
 
 TextFrames::Result TextFrames::push(std::string_view raw) {
@@ -293,7 +277,7 @@ TextFrames::Result TextFrames::push(std::string_view raw) {
   }
   const bool begins = !format_.prefix.empty() &&
                       (content.starts_with(format_.prefix) || behind_stamp(line).starts_with(format_.prefix));
-  if (!many || begins) lines_.clear(), open_ = !many && format_.prefix.empty() ? true : begins;
+  if (!many || begins) lines_.clear(), open_ = begins || format_.prefix.empty();
   if (!open_) return Result::torn;
   if (format_.checksum != "none") {
     const auto sum = checksum_of(line);
