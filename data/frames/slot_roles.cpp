@@ -1,6 +1,8 @@
 // What each slot of a frame is, by models.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 
 #include "data/frames/probe.h"
@@ -47,17 +49,15 @@ bool counts(const std::vector<double>& v) {
   return false;
 }
 
-/// Rises at a steady rate; the usual step, 0 where it does not.
+/// Of finite numbers that rise at a steady rate the usual step; 0 where they do not.
 double steady_step(const std::vector<double>& v) {
-  if (v.size() < kFew || constant(v) || !std::ranges::all_of(v, [](double x) { return std::isfinite(x); }))
-    return 0;
+  if (v.size() < kFew || constant(v)) return 0;
   for (const double modulus : {0.0, 65536.0, 4294967296.0}) {
-    std::vector<double> all = steps(v, modulus);
     if (modulus > 0 && std::ranges::max(v) >= modulus) continue;
-    const auto rises = static_cast<double>(std::ranges::count_if(all, [](double s) { return s >= 0; }));
+    std::vector<double> all = steps(v, modulus);
+    const auto fell = static_cast<double>(std::ranges::count_if(all, [](double s) { return s < 0; }));
     const double usual = quantile(all, 0.5), early = quantile(all, 0.1), late = quantile(all, 0.9);
     const double mean = (v.back() - v.front()) / static_cast<double>(all.size());
-    const double fell = static_cast<double>(all.size()) - rises;
     if (fell > std::max(1.0, 0.02 * static_cast<double>(all.size()))) continue;
     if (usual > 0 && early > 0.2 * usual && late < 4 * usual) return usual;
     // Coarser than the frames: never more than two of its ticks from a straight line.
@@ -147,161 +147,162 @@ std::string sum_of_values(const TextGrammar& grammar, std::size_t slot) {
   return {};
 }
 
+/// Of slot `c`, by its own numbers; `clock`: there is one already.
+SlotRole role_of(TextGrammar& g, std::size_t c, double seconds, bool clock) {
+  const std::vector<double>& v = g.columns[c];
+  if (g.words[c]) return {SlotRole::words, "no number, such as " + in_quotes(g.sample[c])};
+  if (c >= 2 && c + 2 >= g.columns.size())
+    if (const std::string sum = sum_of_values(g, c); !sum.empty()) return {SlotRole::checksum, sum};
+  if (g.wall[c]) return {SlotRole::clock, "a time of day or date", 1};
+  const bool finite = std::ranges::all_of(v, [](double x) { return std::isfinite(x); });
+  const bool live = seconds >= kAtOnceS;
+  if (const auto unit = live && finite && !clock ? unit_of_clock(v, seconds) : std::nullopt)
+    return {SlotRole::clock, "rises as fast as time goes", *unit};
+  if (counts(v)) return {SlotRole::counter, "rises by one"};
+  if (const double step = finite ? steady_step(v) : 0; step > 0) {
+    // Of one that runs over, or beside another clock, arrival says the unit; in a file its step does.
+    const double unit = live ? unit_live(step, v.size(), seconds) : unit_of_step(step, whole(v));
+    if (unit == 0 && !clock)
+      g.doubt = "slot " + std::to_string(c) + " rises by about " + format(step, 3) +
+                " a frame, which is time in no unit (s, ms, us, ns): a clock, or a signal that only rose";
+    return {SlotRole::clock, "rises at a steady rate, " + format(step, 3) + " a frame", unit};
+  }
+  if (constant(v) && label_behind(g, c))
+    return {SlotRole::label, "never changes, and ':' or '=' stands behind it"};
+  if (constant(v))
+    return {SlotRole::constant,
+            std::isnan(v[0]) ? "says " + in_quotes(g.sample[c]) + " only" : "is always " + format(v[0])};
+  if (!finite || v.size() < kFew || !std::ranges::is_sorted(v))
+    return {SlotRole::signal, "changes from frame to frame"};
+  g.doubt = "slot " + std::to_string(c) +
+            " only rises, and not steadily: a clock, or a signal that rose meanwhile; listen for longer";
+  return {SlotRole::other, "only rises"};
+}
+
+/// Rows of a frame of several lines: the number that each begins with.
+void label_rows(const TextGrammar& g, std::vector<SlotRole>& roles) {
+  const auto lines = static_cast<std::size_t>(g.format.lines_per_frame);
+  const std::size_t n = roles.size(), width = n / lines;
+  if (lines < 2 || n % lines != 0 || width < 2) return;
+  for (std::size_t r = 0; r < lines; ++r)
+    if (!constant(g.columns[r * width]) ||
+        (r > 0 && g.columns[r * width][0] != g.columns[(r - 1) * width][0] + 1))
+      return;
+  for (std::size_t r = 0; r < lines; ++r) roles[r * width] = {SlotRole::label, "the row of its line"};
+}
+
+bool candidate(const SlotRole& role) {
+  return role.kind == SlotRole::signal || role.kind == SlotRole::constant;
+}
+std::vector<std::size_t> candidates(const std::vector<SlotRole>& roles) {
+  std::vector<std::size_t> all;
+  for (std::size_t c = 0; c < roles.size(); ++c)
+    if (candidate(roles[c])) all.push_back(c);
+  return all;
+}
+
+/// Numbers named otherwise than most are no taxels of the array.
+void compare_names(TextGrammar& g, std::vector<SlotRole>& roles) {
+  std::map<std::string, std::vector<std::size_t>> named;
+  std::string name;
+  for (std::size_t c = 0; c < roles.size(); ++c) {
+    if (g.format.separator != 0) {
+      if (g.words[c] && !stem(g.sample[c]).empty()) name = stem(g.sample[c]);
+    } else if (candidate(roles[c])) {
+      const std::string own = stem(g.before[c]);
+      const bool first = c > 0 && !candidate(roles[c - 1]) && g.format.lines_per_frame == 1;
+      if (!own.empty() || first) name = own;
+    }
+    if (candidate(roles[c])) named[name].push_back(c);
+  }
+  if (named.size() < 2) return;
+  const auto& largest = *std::ranges::max_element(named, {}, [](const auto& e) { return e.second.size(); });
+  for (const auto& [label, slots] : named)
+    if (4 * slots.size() <= largest.second.size() || (slots.size() == 1 && largest.second.size() >= 4))
+      for (const std::size_t c : slots)
+        roles[c] = {SlotRole::other, "named " + in_quotes(label) + " unlike the others"};
+    else if (slots.size() != largest.second.size())
+      g.doubt = std::to_string(slots.size()) + " numbers named " + in_quotes(label) + " beside " +
+                std::to_string(largest.second.size()) + " named " + in_quotes(largest.first) +
+                ": one array, or two quantities";
+}
+
+/// Nor are a few that are written with other decimals.
+void compare_decimals(TextGrammar& g, std::vector<SlotRole>& roles) {
+  const std::vector<std::size_t> all = candidates(roles);
+  std::array<std::vector<std::size_t>, 2> pointed;  // without and with decimals
+  for (const std::size_t c : all)
+    if (!std::isnan(g.columns[c][0]) || !constant(g.columns[c])) pointed[g.decimals[c] > 0].push_back(c);
+  for (const bool which : {false, true}) {
+    if (pointed[which].size() > 3 || pointed[!which].size() < 4 * pointed[which].size()) continue;
+    for (const std::size_t c : pointed[which]) {
+      if (roles[c].kind == SlotRole::constant && !which) continue;
+      // At an edge: all before it, or all behind it, are of its kind.
+      const auto alike = [&](std::size_t o) { return (g.decimals[o] > 0) == which; };
+      const auto place = std::ranges::find(all, c);
+      if (std::all_of(all.begin(), place, alike) || std::all_of(place, all.end(), alike))
+        roles[c] = {SlotRole::other,
+                    which ? "has decimals, the others have none" : "has no decimals, the others have"};
+      else
+        g.doubt = "slot " + std::to_string(c) +
+                  (which ? " has decimals, those" : " has no decimals as those") + " beside it " +
+                  (which ? "have none" : "have") + ": a taxel, or another quantity";
+    }
+  }
+}
+
+/// A constant at an edge may be a version, a count or a dead taxel.
+void look_at_edges(TextGrammar& g, std::vector<SlotRole>& roles) {
+  const std::vector<std::size_t> all = candidates(roles);
+  const auto moves = [&](std::size_t c) { return roles[c].kind == SlotRole::signal; };
+  const auto first = std::ranges::find_if(all, moves);
+  const auto last = std::find_if(all.rbegin(), std::make_reverse_iterator(first), moves).base();
+  const auto lead = static_cast<std::size_t>(first - all.begin()),
+             trail = static_cast<std::size_t>(all.end() - last);
+  if (g.format.lines_per_frame > 1 || last - first < 4 || lead + trail == 0 || lead + trail > 4) return;
+  int best = -1;
+  std::vector<std::pair<std::size_t, std::size_t>> ways;  // no taxels before and behind the array
+  for (std::size_t a = 0; a <= lead; ++a)
+    for (std::size_t b = 0; b <= trail; ++b) {
+      const std::size_t values = all.size() - a - b;
+      const bool counted = a > 0 && g.columns[all[a - 1]][0] == static_cast<double>(values) && values > 4;
+      const int good = counted ? 4 : neat(values);
+      if (good > best) best = good, ways.clear();
+      if (good == best) ways.emplace_back(a, b);
+    }
+  const auto [before, behind] = ways[0];
+  const auto left = [&](const auto& way) { return std::to_string(all.size() - way.first - way.second); };
+  if (ways.size() > 1 && best < (before + behind == 0 ? 3 : 4))
+    g.doubt =
+        "constants at the edge may be taxels or not: " + left(ways[0]) + " or " + left(ways[1]) + " values";
+  for (std::size_t i = 0; i < before; ++i) roles[all[i]] = {SlotRole::other, "constant before the array"};
+  for (std::size_t i = all.size() - behind; i < all.size(); ++i)
+    roles[all[i]] = {SlotRole::other, "constant behind the array"};
+}
+
 }  // namespace
 
 std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
-  const std::size_t n = g.columns.size();
-  std::vector<SlotRole> roles(n);
+  std::vector<SlotRole> roles;
   bool clock = false;
-  for (std::size_t c = 0; c < n; ++c) {
-    const std::vector<double>& v = g.columns[c];
-    SlotRole& role = roles[c];
-    if (g.words[c]) {
-      role = {SlotRole::words, "no number, such as " + in_quotes(g.sample[c])};
-      continue;
-    }
-    const std::string sum = c >= 2 && c + 2 >= n ? sum_of_values(g, c) : "";
-    const bool finite = std::ranges::all_of(v, [](double x) { return std::isfinite(x); });
-    const double step = finite ? steady_step(v) : 0;
-    const auto unit = !finite || clock ? std::nullopt : unit_of_clock(v, seconds);
-    const bool live = seconds >= kAtOnceS;
-    if (!sum.empty()) {
-      role = {SlotRole::checksum, sum};
-    } else if (g.wall[c]) {
-      role = {SlotRole::clock, "a time of day or date", 1};
-    } else if (live && unit && v.size() >= 3) {
-      role = {SlotRole::clock, "rises as fast as time goes", *unit};
-    } else if (counts(v)) {
-      role = {SlotRole::counter, "rises by one"};
-    } else if (step > 0) {
-      // Of one that runs over, or beside another clock, arrival says the unit; in a file its step does.
-      role = {SlotRole::clock, "rises at a steady rate, " + format(step, 3) + " a frame",
-              live ? unit_live(step, v.size(), seconds) : unit_of_step(step, whole(v))};
-      if (role.unit_s == 0 && !clock)
-        g.doubt = "slot " + std::to_string(c) + " rises by about " + format(step, 3) +
-                  " a frame, which is time in no unit (s, ms, us, ns): a clock, or a signal that only rose";
-    } else if (constant(v) && label_behind(g, c)) {
-      role = {SlotRole::label, "never changes, and ':' or '=' stands behind it"};
-    } else if (constant(v)) {
-      role = {SlotRole::constant,
-              std::isnan(v[0]) ? "says " + in_quotes(g.sample[c]) + " only" : "is always " + format(v[0])};
-    } else {
-      role.why = "changes from frame to frame";
-      if (finite && v.size() >= kFew && std::ranges::is_sorted(v)) {
-        role = {SlotRole::other, "only rises"};
-        g.doubt =
-            "slot " + std::to_string(c) +
-            " only rises, and not steadily: a clock, or a signal that rose meanwhile; listen for longer";
-      }
-    }
-    clock = clock || (role.kind == SlotRole::clock && role.unit_s > 0);
+  for (std::size_t c = 0; c < g.columns.size(); ++c) {
+    roles.push_back(role_of(g, c, seconds, clock));
+    clock = clock || (roles[c].kind == SlotRole::clock && roles[c].unit_s > 0);
   }
-  // Rows of a frame of several lines: the number that each begins with.
-  const auto lines = static_cast<std::size_t>(g.format.lines_per_frame);
-  if (lines > 1 && n % lines == 0 && n / lines > 1 && n > lines) {
-    const std::size_t width = n / lines;
-    bool rows = true;
-    for (std::size_t r = 0; r < lines; ++r)
-      rows = rows && constant(g.columns[r * width]) &&
-             (r == 0 || g.columns[r * width][0] == g.columns[(r - 1) * width][0] + 1);
-    for (std::size_t r = 0; rows && r < lines; ++r)
-      roles[r * width] = {SlotRole::label, "the row of its line"};
-  }
-  const auto candidate = [&](std::size_t c) {
-    return roles[c].kind == SlotRole::signal || roles[c].kind == SlotRole::constant;
-  };
-  std::vector<std::size_t> all;
-  for (std::size_t c = 0; c < n; ++c)
-    if (candidate(c)) all.push_back(c);
-  if (all.empty()) return roles;
-  // Numbers named otherwise than most, or written with other decimals, are no taxels of the array.
-  std::map<std::string, std::vector<std::size_t>> named;
-  std::string name;
-  for (std::size_t c = 0; c < n && g.format.separator != 0; ++c) {
-    if (g.words[c] && !stem(g.sample[c]).empty()) name = stem(g.sample[c]);
-    if (candidate(c)) named[name].push_back(c);
-  }
-  if (g.format.separator == 0)
-    for (const std::size_t c : all) {
-      const std::string own = stem(g.before[c]);
-      const bool unnamed = trimmed(g.before[c]).empty() || own.empty();
-      if (!unnamed || (c > 0 && !candidate(c - 1) && lines == 1)) name = own;
-      named[name].push_back(c);
-    }
-  if (named.size() > 1) {
-    const auto& largest = *std::ranges::max_element(named, {}, [](const auto& e) { return e.second.size(); });
-    for (const auto& [label, slots] : named)
-      if (4 * slots.size() <= largest.second.size() || (slots.size() == 1 && largest.second.size() >= 4))
-        for (const std::size_t c : slots)
-          roles[c] = {SlotRole::other, "named " + in_quotes(label) + " unlike the others"};
-      else if (slots.size() != largest.second.size())
-        g.doubt = std::to_string(slots.size()) + " numbers named " + in_quotes(label) + " beside " +
-                  std::to_string(largest.second.size()) + " named " + in_quotes(largest.first) +
-                  ": one array, or two quantities";
-  }
-  std::erase_if(all, [&](std::size_t c) { return !candidate(c); });
-  std::map<bool, std::vector<std::size_t>> pointed;
-  for (const std::size_t c : all)
-    if (!std::isnan(g.columns[c][0]) || !constant(g.columns[c])) pointed[g.decimals[c] > 0].push_back(c);
-  if (pointed.size() == 2)
-    for (const bool which : {false, true})
-      if (pointed[which].size() <= 3 && pointed[!which].size() >= 4 * pointed[which].size())
-        for (const std::size_t c : pointed[which]) {
-          if (roles[c].kind == SlotRole::constant && !which) continue;
-          // At an edge: all before it, or all behind it, are of its kind.
-          const auto alike = [&](std::size_t o) { return (g.decimals[o] > 0) == which; };
-          const auto place = std::ranges::find(all, c);
-          if (std::all_of(all.begin(), place, alike) || std::all_of(place, all.end(), alike))
-            roles[c] = {SlotRole::other,
-                        which ? "has decimals, the others have none" : "has no decimals, the others have"};
-          else
-            g.doubt = "slot " + std::to_string(c) +
-                      (which ? " has decimals, those" : " has no decimals as those") + " beside it " +
-                      (which ? "have none" : "have") + ": a taxel, or another quantity";
-        }
-  std::erase_if(all, [&](std::size_t c) { return !candidate(c); });
-  // A constant at an edge may be a version, a count or a dead taxel.
-  const auto lead = static_cast<std::size_t>(
-      std::ranges::find_if(all, [&](std::size_t c) { return roles[c].kind == SlotRole::signal; }) -
-      all.begin());
-  std::size_t trail = 0;
-  while (trail + lead < all.size() && roles[all[all.size() - 1 - trail]].kind == SlotRole::constant) ++trail;
-  const std::size_t moving = all.size() - lead - trail;
-  if (lines == 1 && moving >= 4 && (lead > 0 || trail > 0) && lead + trail <= 4) {
-    int best = -1;
-    std::vector<std::pair<std::size_t, std::size_t>> ways;
-    for (std::size_t a = 0; a <= lead; ++a)
-      for (std::size_t b = 0; b <= trail; ++b) {
-        const std::size_t values = all.size() - a - b;
-        const bool counted = a > 0 && g.columns[all[a - 1]][0] == static_cast<double>(values) && values > 4;
-        const int good = counted ? 4 : neat(values);
-        if (good > best) best = good, ways.clear();
-        if (good == best) ways.emplace_back(a, b);
-      }
-    if (ways.size() > 1 && best < 4 && ways[0] != std::pair<std::size_t, std::size_t>{0, 0})
-      g.doubt = "constants at the edge may be taxels: " +
-                std::to_string(all.size() - ways[0].first - ways[0].second) + " or " +
-                std::to_string(all.size() - ways[1].first - ways[1].second) + " values";
-    if (ways.size() > 1 && ways[0] == std::pair<std::size_t, std::size_t>{0, 0} && best == 3 &&
-        neat(all.size()) == 3)
-      ways.resize(1);
-    else if (ways.size() > 1 && best < 4)
-      g.doubt = "constants at the edge may be taxels or not: " + std::to_string(all.size()) + " or " +
-                std::to_string(all.size() - ways[1].first - ways[1].second) + " values";
-    for (std::size_t a = 0; a < ways[0].first; ++a)
-      roles[all[a]] = {SlotRole::other, "constant before the array"};
-    for (std::size_t b = 0; b < ways[0].second; ++b)
-      roles[all[all.size() - 1 - b]] = {SlotRole::other, "constant behind the array"};
-    std::erase_if(all, [&](std::size_t c) { return !candidate(c); });
-  }
-  const std::size_t values = all.size();
+  label_rows(g, roles);
+  if (candidates(roles).empty()) return roles;
+  compare_names(g, roles);
+  compare_decimals(g, roles);
+  look_at_edges(g, roles);
+  const std::size_t values = candidates(roles).size();
   if (values > 8 && neat(values) == 1)
     for (const std::size_t less : {1U, 2U})
       if (g.doubt.empty() && neat(values - less) == 3)
         g.doubt = std::to_string(values) + " values make no array but a line: all may be taxels, or " +
                   std::to_string(values - less) + " and " + std::to_string(less) + " of another kind";
   // Lines of different counts may be different quantities.
-  if (lines > 1 && n % lines != 0 && values < 16 && g.doubt.empty())
+  const auto lines = static_cast<std::size_t>(g.format.lines_per_frame);
+  if (lines > 1 && roles.size() % lines != 0 && values < 16 && g.doubt.empty())
     g.doubt = "a frame of " + std::to_string(lines) + " lines with different counts of numbers, " +
               std::to_string(values) + " in all: they may be different quantities";
   return roles;
