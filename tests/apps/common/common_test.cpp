@@ -1,12 +1,16 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <csignal>
 #include <filesystem>
+#include <thread>
 
 #include "apps/common/command_line/arguments.h"
 #include "apps/common/command_line/nearest.h"
 #include "apps/common/output/output_folder.h"
 #include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
 #include "apps/common/running/threads.h"
 #include "io/files/file.h"
 #include "tests/expect_error.h"
@@ -212,6 +216,43 @@ TEST(OutputFolder, ANameThatWasTakenMeanwhileKeepsWhatItHolds) {
   OutputFolder output(folder.file("a"));
   write_file(output.path() + "/plate.stl", "other");
   EXPECT_ERROR(output.keep(), FileError, "is another file");
+}
+
+/// Two of them at the same moment, one for each of two threads.
+void signal_two_threads() {
+  sigset_t held;
+  sigemptyset(&held);
+  sigaddset(&held, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &held, nullptr);
+  std::atomic<int> waiting{2};
+  const auto take = [&] {
+    pthread_kill(pthread_self(), SIGINT);
+    for (--waiting; waiting > 0;) continue;
+    pthread_sigmask(SIG_UNBLOCK, &held, nullptr);
+  };
+  std::thread other(take);
+  take();
+  other.join();
+}
+
+TEST(Signals, ASecondOneEndsTheProgramHoweverSoonItComes) {
+  for (int i = 0; i < 100; ++i)
+    EXPECT_EXIT((catch_signals(), signal_two_threads(), _exit(0)), testing::KilledBySignal(SIGINT), "");
+}
+
+TEST(Signals, WhatMustBeFinishedIs) {
+  const auto finish_and_go_on = [] {
+    catch_signals();
+    {
+      const FinishDespiteSignals contact;
+      signal_two_threads();
+      std::raise(SIGINT);
+    }
+    std::raise(SIGINT);
+    if (interrupting_signal() != SIGINT) _exit(0);
+    std::raise(SIGINT);
+  };
+  EXPECT_EXIT((finish_and_go_on(), _exit(0)), testing::KilledBySignal(SIGINT), "");
 }
 
 }  // namespace
