@@ -1,6 +1,7 @@
 #include "hardware/boards/listen.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "hardware/ports/errors.h"
 
@@ -13,10 +14,13 @@ std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, dou
   std::vector<Heard> heard;
   std::vector<std::byte> buffer(65536);
   std::size_t bytes = 0;
-  const double until = opened.port->now() + seconds;
+  // A machine that stands still listens to nothing: of each wait no more counts than was asked for.
+  double now = opened.port->now(), listened = 0;
   try {
-    while (!(stop && stop()) && opened.port->now() < until && bytes < kMostBytes) {
-      const Received got = opened.port->read(buffer, std::min(until, opened.port->now() + kWaitS));
+    while (!stop() && listened < seconds && bytes < kMostBytes) {
+      const Received got = opened.port->read(buffer, now + kWaitS);
+      const double before = std::exchange(now, opened.port->now());
+      listened += std::min(now - before, kWaitS);
       if (got.count == 0) continue;
       heard.push_back({got.time_s, {reinterpret_cast<const char*>(buffer.data()), got.count}});
       // As open_port() makes a line of it for a sensor that is known to send text.

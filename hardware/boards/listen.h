@@ -10,9 +10,10 @@
 
 namespace supertac {
 
-/// What comes from the opened `port` within `seconds`, at most 16 MiB, or until `stop` says so. A datagram of
-/// text is a line. Throws PortError, but for the end of a port: what came until then is what there is.
+/// What comes from the opened `port` within `seconds`, in which the machine does not stand still, at most
+/// 16 MiB, or until `stop` says so. A datagram of text is a line. Throws PortError, but for the end of a
+/// port: what came until then is what there is.
 std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, double seconds,
-                          const std::function<bool()>& stop = {});
+                          const std::function<bool()>& stop);
 
 }  // namespace supertac

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "hardware/boards/listen.h"
 #include "hardware/collection/capture.h"
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
@@ -101,6 +102,14 @@ std::unique_ptr<Port> hundred_frames() {
   std::vector<ScriptedPort::Read> reads;
   for (int i = 0; i < 10; ++i) reads.push_back({10 + 0.01 * i, some_frames(10)});
   return std::make_unique<ScriptedPort>(reads);
+}
+
+// A minute in which the machine stands still is none of half a second's.
+TEST(Listen, ListensForAsLongAsTheMachineRuns) {
+  std::vector<ScriptedPort::Read> reads;
+  for (int i = 0; i < 30; ++i) reads.push_back({10 + 0.04 * i + (i < 3 ? 0 : 60), some_frames(1)});
+  const auto never = [] { return false; };
+  EXPECT_EQ(listen({.port = std::make_unique<ScriptedPort>(reads)}, "script", 0.5, never).size(), 13U);
 }
 
 TEST(RigBoard, AReplaysReaderWaitsForItsConsumer) {
