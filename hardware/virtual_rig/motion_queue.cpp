@@ -1,5 +1,8 @@
 #include "hardware/virtual_rig/motion_queue.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "hardware/printers/marlin_line.h"
 #include "hardware/printers/motion_model.h"
 
@@ -27,8 +30,17 @@ void MotionQueue::move_to(const Point3& to, double speed_mm_s, double t) {
   const Point3 from = target();
   if (from == to) return;
   const double start = blocks_.empty() ? t + start_delay_s_ : blocks_.back().end;
-  end_ = start + slowness_ * trapezoid_duration(distance(from, to), speed_mm_s, acceleration_);
+  const double length = distance(from, to), rise = std::abs(to.z - from.z);
+  const double speed = rise > 0 ? std::min(speed_mm_s, rig::kLiftMmS * length / rise) : speed_mm_s;
+  end_ = start + slowness_ * trapezoid_duration(length, speed, acceleration_);
   blocks_.push_back({from, to, start, end_});
+}
+
+void MotionQueue::home(double t) {
+  const Point3 at = target();
+  move_to({at.x, at.y, at.z + 5}, rig::kLiftMmS, t);
+  move_to({0, 0, at.z + 5}, rig::kFastestMmS, t);
+  move_to({}, rig::kLiftMmS, t);
 }
 
 void MotionQueue::hold(double t, double seconds) {

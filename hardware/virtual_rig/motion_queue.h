@@ -26,7 +26,10 @@ class MotionQueue {
   /// When the move now running ends; end_time() when none runs.
   double next_end() const { return blocks_.empty() ? end_ : blocks_.front().end; }
   bool full(double t);
+  /// At this speed, or as fast as z goes.
   void move_to(const Point3& to, double speed_mm_s, double t);
+  /// Up, across, and down to 0, 0, 0.
+  void home(double t);
   /// Stands for so long, then goes on.
   void hold(double t, double seconds);
   /// Stops dead; returns where.

@@ -20,8 +20,6 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kAdapterBytes = 65536;
-
 [[noreturn]] void failed(const std::string& what) {
   throw PortError("virtual rig: " + what + ": " + strerror(errno));
 }
@@ -66,8 +64,8 @@ void PseudoTerminal::unplug() {
 double PtyRig::now(double speedup) { return monotonic_seconds() * speedup; }
 
 PtyRig::PtyRig(std::unique_ptr<RigAtPorts> rig, const std::string& board_link,
-               const std::string& printer_link, double speedup, bool adapter)
-    : speedup_(speedup), adapter_(adapter), board_(board_link), printer_(printer_link), rig_(std::move(rig)) {
+               const std::string& printer_link, double speedup)
+    : board_(board_link), printer_(printer_link), rig_(std::move(rig)), speedup_(speedup) {
   rig_->board_sink = [this](std::span<const std::byte> bytes, double) { return send_frame(bytes); };
   thread_ = std::thread([this] { run(); });
 }
@@ -77,21 +75,6 @@ PtyRig::~PtyRig() {
   thread_.join();
 }
 
-void PtyRig::unplug_board() {
-  std::lock_guard lock(mutex_);
-  board_.unplug();
-}
-
-void PtyRig::unplug_printer() {
-  std::lock_guard lock(mutex_);
-  printer_.unplug();
-}
-
-void PtyRig::with_rig(const std::function<void(RigAtPorts&)>& action) {
-  std::lock_guard lock(mutex_);
-  action(*rig_);
-}
-
 void PtyRig::run() {
   while (!stop_) {
     pollfd printer{-1, POLLIN, 0};
@@ -99,7 +82,6 @@ void PtyRig::run() {
     {
       std::lock_guard lock(mutex_);
       serve_printer();
-      serve_adapter();
       const double next = std::clamp((rig_->next_event() / speedup_) - monotonic_seconds(), 1e-4, 0.01);
       wait.tv_nsec = static_cast<long>(1e9 * next);
       printer.fd = printer_.descriptor();
@@ -123,24 +105,12 @@ void PtyRig::serve_printer() {
   if (printer_out_.size() > 65536) printer_out_.clear();  // nobody listens
 }
 
-// What an adapter could not hand on yet.
-void PtyRig::serve_adapter() {
-  if (board_.descriptor() < 0 || board_out_.empty()) return;
-  const ssize_t sent = ::write(board_.descriptor(), board_out_.data(), board_out_.size());
-  if (sent > 0) board_out_.erase(board_out_.begin(), board_out_.begin() + sent);
-}
-
-bool PtyRig::send_frame(std::span<const std::byte> bytes) {
-  if (board_.descriptor() < 0) return true;
-  if (adapter_) {  // has a memory of its own
-    if (board_out_.size() > kAdapterBytes) return false;
-    board_out_.insert(board_out_.end(), bytes.begin(), bytes.end());
-    serve_adapter();
-    return true;
-  }
-  // When the terminal is full (4095 bytes, 24.8 ms) a frame vanishes; one that went in half is completed by
-  // nothing, as on a stalled USB line.
-  return ::write(board_.descriptor(), bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
+// When the terminal is full (4095 bytes, 24.8 ms) a frame vanishes; one that went in half is completed by
+// nothing, as on a stalled USB line.
+std::size_t PtyRig::send_frame(std::span<const std::byte> bytes) {
+  if (board_.descriptor() < 0) return bytes.size();
+  return static_cast<std::size_t>(
+      std::max<ssize_t>(0, ::write(board_.descriptor(), bytes.data(), bytes.size())));
 }
 
 }  // namespace supertac

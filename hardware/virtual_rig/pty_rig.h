@@ -3,7 +3,6 @@
 #pragma once
 
 #include <atomic>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -34,30 +33,24 @@ class PseudoTerminal {
 
 class PtyRig {
  public:
-  /// Runs at `speedup` times the wall clock until destroyed. `rig` begins at now(speedup). `adapter`: between
-  /// board and host stands one with a memory of its own.
+  /// Runs at `speedup` times the wall clock until destroyed. `rig` begins at now(speedup).
   PtyRig(std::unique_ptr<RigAtPorts> rig, const std::string& board_link, const std::string& printer_link,
-         double speedup = 1, bool adapter = false);
+         double speedup = 1);
   static double now(double speedup);
   ~PtyRig();
 
-  void unplug_board();
-  void unplug_printer();
-  /// Runs `action` with the rig held still.
-  void with_rig(const std::function<void(RigAtPorts&)>& action);
+ protected:
+  std::mutex mutex_;  // of the rig and its ports
+  PseudoTerminal board_, printer_;
+  std::unique_ptr<RigAtPorts> rig_;
 
  private:
   void run();
-  bool send_frame(std::span<const std::byte> bytes);
+  std::size_t send_frame(std::span<const std::byte> bytes);
   void serve_printer();
-  void serve_adapter();
 
   double speedup_;
-  bool adapter_;
-  std::mutex mutex_;
-  PseudoTerminal board_, printer_;
-  std::unique_ptr<RigAtPorts> rig_;
-  std::vector<std::byte> printer_out_, board_out_;
+  std::vector<std::byte> printer_out_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -2,25 +2,14 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <optional>
 
-#include "hardware/printers/marlin_line.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {
 
 constexpr double kStopHoldsS = 1, kStartDelayS = 0.107, kAcceleration = 500;  // of real ones
-
-std::optional<double> parameter(const std::string& command, char letter) {
-  const std::size_t at = command.find(letter, 1);
-  double value = 0;
-  const char* last = command.data() + command.size();
-  if (at == std::string::npos || std::from_chars(command.data() + at + 1, last, value).ec != std::errc{})
-    return std::nullopt;
-  return value;
-}
 
 /// "M410" of "M0410 S1".
 std::string code_of(const std::string& command) {
@@ -30,6 +19,15 @@ std::string code_of(const std::string& command) {
 }
 
 }  // namespace
+
+std::optional<double> parameter(const std::string& command, std::string_view name) {
+  const std::size_t at = command.find(name, 1);
+  if (at == std::string::npos) return std::nullopt;
+  double value = 0;
+  const char *first = command.data() + at + name.size(), *last = command.data() + command.size();
+  const auto [end, error] = std::from_chars(first, last, value, std::chars_format::fixed);
+  return error == std::errc{} ? std::optional(value) : std::nullopt;
+}
 
 BoardFrame frame_of(const TaxelVolts& volts) {
   const auto code = [](double v) { return static_cast<std::uint16_t>(rig::adc_of(v)); };
@@ -88,7 +86,7 @@ void PlainRig::take_line(const std::string& line) {
   std::string command = line.substr(0, line.find('*'));
   std::optional<double> number;
   if (command[0] == 'N') {
-    number = parameter(" " + command, 'N');
+    number = parameter(" " + command, "N");
     command.erase(0, std::min(command.size(), command.find(' ') + 1));
   }
   if (command.empty()) return;
@@ -131,9 +129,9 @@ std::string PlainRig::answer_to(const std::string& command) {
     home();
   } else if (code == "G92") {
     const Point3 at = motion_.target();
-    zero_ = {at.x - parameter(command, 'X').value_or(at.x - zero_.x),
-             at.y - parameter(command, 'Y').value_or(at.y - zero_.y),
-             at.z - parameter(command, 'Z').value_or(at.z - zero_.z)};
+    zero_ = {at.x - parameter(command, "X").value_or(at.x - zero_.x),
+             at.y - parameter(command, "Y").value_or(at.y - zero_.y),
+             at.z - parameter(command, "Z").value_or(at.z - zero_.z)};
   } else if (code == "M114") {
     const Point3 p = command.ends_with("R") ? motion_.at(now_s_) : motion_.target();
     return "X:" + format(p.x - zero_.x, 2) + " Y:" + format(p.y - zero_.y, 2) +
@@ -152,21 +150,16 @@ std::string PlainRig::answer_to(const std::string& command) {
 }
 
 void PlainRig::move(const std::string& command) {
-  feed_mm_s_ = parameter(command, 'F').value_or(60 * feed_mm_s_) / 60;
+  feed_mm_s_ = parameter(command, "F").value_or(60 * feed_mm_s_) / 60;
   const Point3 from = motion_.target();
-  const Point3 to{parameter(command, 'X').value_or(from.x - zero_.x) + zero_.x,
-                  parameter(command, 'Y').value_or(from.y - zero_.y) + zero_.y,
-                  parameter(command, 'Z').value_or(from.z - zero_.z) + zero_.z};
-  const double rise = std::abs(to.z - from.z);
-  const double fastest = rise > 0 ? rig::kLiftMmS * distance(from, to) / rise : feed_mm_s_;
-  motion_.move_to(to, std::min(feed_mm_s_, fastest), now_s_);
+  const Point3 to{parameter(command, "X").value_or(from.x - zero_.x) + zero_.x,
+                  parameter(command, "Y").value_or(from.y - zero_.y) + zero_.y,
+                  parameter(command, "Z").value_or(from.z - zero_.z) + zero_.z};
+  motion_.move_to(to, feed_mm_s_, now_s_);
 }
 
 void PlainRig::home() {
-  const double z = motion_.target().z + 5;
-  motion_.move_to({motion_.target().x, motion_.target().y, z}, rig::kLiftMmS, now_s_);
-  motion_.move_to({0, 0, z}, rig::kFastestMmS, now_s_);
-  motion_.move_to({0, 0, 0}, rig::kLiftMmS, now_s_);
+  motion_.home(now_s_);
   zero_ = {};
   held_ = true;
   held_until_s_ = motion_.end_time();

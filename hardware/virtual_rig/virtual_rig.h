@@ -5,9 +5,10 @@
 #include <array>
 #include <deque>
 #include <functional>
-#include <limits>
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "data/frames/board_frame.h"
@@ -28,8 +29,8 @@ class RigAtPorts {
   virtual std::vector<std::byte> from_printer() = 0;
   virtual bool printer_unplugged() const { return false; }
 
-  /// Takes the board's bytes at time t; false when the host does not take them.
-  std::function<bool(std::span<const std::byte>, double t)> board_sink;
+  /// Takes the board's bytes at time t; returns how many of them the host takes.
+  std::function<std::size_t(std::span<const std::byte>, double t)> board_sink;
 };
 
 /// The taxels' voltages when the finger's centre is at (x, y, z) mm of the printer at time t (s).
@@ -37,6 +38,9 @@ using TaxelVolts = std::array<double, rig::kTaxels>;
 using FingerSignals = std::function<TaxelVolts(double x, double y, double z, double t)>;
 /// As the board sends them; the other patches are at rest.
 BoardFrame frame_of(const TaxelVolts& volts);
+
+/// The number behind a letter, as Marlin's parser reads it.
+std::optional<double> parameter(const std::string& command, std::string_view name);
 
 /// The board at its nominal rate. A running Marlin with an emergency parser, the head at rig::kMounted, that
 /// checks the numbers of lines alone and knows G0, G1, G21, G28, G90, G92, M105, M110, M112, M114 (R), M115,

@@ -126,23 +126,23 @@ SimulatedRig::~SimulatedRig() = default;
 std::unique_ptr<Port> SimulatedRig::printer_port() { return std::make_unique<PrinterPort>(*this); }
 std::unique_ptr<Port> SimulatedRig::board_port() { return std::make_unique<BoardPort>(*this); }
 
-bool SimulatedRig::take_board_bytes(std::span<const std::byte> bytes, double t) {
-  if (!board_listens_ || board_gone_) return true;  // nobody looks
+std::size_t SimulatedRig::take_board_bytes(std::span<const std::byte> bytes, double t) {
+  if (!board_listens_ || board_gone_) return bytes.size();  // nobody looks
   if (frozen_until_ > t) return hold(bytes);
   board_time_ = std::max(board_time_, t + kUsbLatency * latency_.uniform());
   board_chunks_.push_back({board_time_, {bytes.begin(), bytes.end()}});
-  return true;
+  return bytes.size();
 }
 
 // A port of a host that stands still: full, it takes what fits of a frame, and nothing of the next.
-bool SimulatedRig::hold(std::span<const std::byte> bytes) {
+std::size_t SimulatedRig::hold(std::span<const std::byte> bytes) {
   const std::size_t count = std::min(bytes.size(), room_);
   room_ -= count;
   if (count > 0)
     board_chunks_.push_back(
         {frozen_until_, {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count)}});
   if (count < bytes.size()) room_ = 0;
-  return count == bytes.size();
+  return count;
 }
 
 // SIGSTOP: both ports' clocks go on, nothing is read. Afterwards the kernel hands on what its buffers held, a

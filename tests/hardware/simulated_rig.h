@@ -42,8 +42,8 @@ class SimulatedRig {
     double time_s;
     std::vector<std::byte> bytes;
   };
-  bool take_board_bytes(std::span<const std::byte> bytes, double t);
-  bool hold(std::span<const std::byte> bytes);
+  std::size_t take_board_bytes(std::span<const std::byte> bytes, double t);
+  std::size_t hold(std::span<const std::byte> bytes);
   void maybe_freeze(std::unique_lock<std::mutex>& lock);
   void advance(std::unique_lock<std::mutex>& lock, double t);
 

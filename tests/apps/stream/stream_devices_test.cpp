@@ -49,7 +49,7 @@ TEST_F(Streaming, AProgramThatWasStoppedStartsANewWindow) {
 
 TEST_F(Streaming, ChunksOfAnAdapterCostLatencyAndNoPicture) {
   RigSettings settings = touching_rig();
-  settings.chunk_s = 0.1;
+  settings.chunk_s = 0.1, settings.memory = 65536;
   plug_in(settings);
   ASSERT_EQ(stream("--board " + board() + " --seconds 5 --json json").code, 0);
   const auto json = result("json");

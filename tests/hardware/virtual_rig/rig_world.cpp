@@ -22,6 +22,7 @@ RigWorld::RigWorld(const RigSettings& settings, double t)
       board_(part_of(settings, settings.board), t),
       chunk_s_(settings.chunk_s),
       chunk_due_(t),
+      memory_(settings.memory),
       chunk_dice_(settings.seed, 14),
       to_printer_bytes_(settings.faults.byte_rate, settings.seed, 11),
       from_printer_bytes_(settings.faults.byte_rate, settings.seed, 12),
@@ -33,9 +34,10 @@ double RigWorld::next_event() const {
 }
 
 void RigWorld::hand_on(double t) {
-  if (!chunk_.empty() && board_sink && !board_sink(chunk_, t)) board_.refuse_last();
-  chunk_.clear();
-  chunk_due_ = t + 0.002 + (chunk_s_ - 0.002) * chunk_dice_.uniform();
+  const std::size_t taken = board_sink && !chunk_.empty() ? board_sink(chunk_, t) : chunk_.size();
+  chunk_.erase(chunk_.begin(), chunk_.begin() + static_cast<std::ptrdiff_t>(taken));
+  if (chunk_.size() > memory_) board_.refuse_last(), chunk_.resize(memory_);
+  chunk_due_ = t + (chunk_.empty() ? 0.002 + (chunk_s_ - 0.002) * chunk_dice_.uniform() : 0.001);
 }
 
 void RigWorld::advance(double t) {

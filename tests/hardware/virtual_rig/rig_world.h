@@ -16,6 +16,7 @@ struct RigSettings {
   bool printer_running = false;  ///< booted long ago
   RigFaults faults{};            ///< replaces those of printer and board
   double chunk_s = 0;      ///< longest wait of an adapter that hands the board's bytes on in chunks; 0: none
+  std::size_t memory = 0;  ///< bytes that this adapter keeps of what the host does not take
   std::uint64_t seed = 1;  ///< replaces those of printer and board
 };
 
@@ -40,6 +41,7 @@ class RigWorld : public RigAtPorts {
   VirtualPrinter printer_;
   VirtualBoard board_;
   double chunk_s_, chunk_due_;
+  std::size_t memory_;
   Dice chunk_dice_;
   std::vector<std::byte> chunk_;  // of an adapter
   ByteFaults to_printer_bytes_, from_printer_bytes_, board_bytes_;
@@ -49,10 +51,19 @@ class FaultyPtyRig : public PtyRig {
  public:
   FaultyPtyRig(const RigSettings& settings, const std::string& board_link, const std::string& printer_link,
                double speedup = 1)
-      : PtyRig(std::make_unique<RigWorld>(settings, now(speedup)), board_link, printer_link, speedup,
-               settings.chunk_s > 0) {}
+      : PtyRig(std::make_unique<RigWorld>(settings, now(speedup)), board_link, printer_link, speedup) {}
+  /// Runs `action` with the rig held still.
   void with_world(const std::function<void(RigWorld&)>& action) {
-    with_rig([&](RigAtPorts& rig) { action(dynamic_cast<RigWorld&>(rig)); });
+    const std::lock_guard lock(mutex_);
+    action(dynamic_cast<RigWorld&>(*rig_));
+  }
+  void unplug_board() {
+    const std::lock_guard lock(mutex_);
+    board_.unplug();
+  }
+  void unplug_printer() {
+    const std::lock_guard lock(mutex_);
+    printer_.unplug();
   }
 };
 

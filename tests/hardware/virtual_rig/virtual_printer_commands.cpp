@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "hardware/printers/marlin_line.h"
+#include "hardware/virtual_rig/virtual_rig.h"
 #include "io/numbers/numbers.h"
 #include "tests/hardware/virtual_rig/marlin_texts.h"
 
@@ -14,17 +14,6 @@ namespace supertac {
 namespace {
 
 constexpr double kInch = 25.4;
-
-// The number behind a letter, as Marlin's parser reads it.
-std::optional<double> parameter(const std::string& command, const std::string& name) {
-  const std::size_t at = command.find(name, 1);
-  if (at == std::string::npos) return std::nullopt;
-  double value = 0;
-  const char* last = command.data() + command.size();
-  const auto [end, error] =
-      std::from_chars(command.data() + at + name.size(), last, value, std::chars_format::fixed);
-  return error == std::errc{} ? std::optional(value) : std::nullopt;
-}
 
 }  // namespace
 
@@ -213,7 +202,7 @@ void VirtualPrinter::move(const std::string& command, double t) {
   if (const auto f = parameter(command, "F"); f && *f > 0) feed_ = unit * *f / 60;
   const Point3 from = motion_.target();
   const auto axis = [&](char letter, double physical, double offset, double limit) {
-    const auto value = parameter(command, {letter});
+    const auto value = parameter(command, {&letter, 1});
     if (!value) return physical;
     double logical = left_over_.relative ? physical - offset + unit * *value : unit * *value;
     if (homed_) logical = std::clamp(logical, 0.0, limit);  // silently, and before homing not at all
@@ -222,19 +211,12 @@ void VirtualPrinter::move(const std::string& command, double t) {
   const Point3 zero = origin();
   const Point3 to{axis('X', from.x, zero.x, settings_.bed.x), axis('Y', from.y, zero.y, settings_.bed.y),
                   axis('Z', from.z, zero.z, settings_.bed.z)};
-  const double length = distance(from, to);
-  const double rise = std::abs(to.z - from.z);
-  const double ordered = feed_ * left_over_.speed_percent / 100;
-  const double speed = rise > 0 ? std::min(ordered, rig::kLiftMmS * length / rise) : ordered;
-  motion_.move_to(to, speed, t);
+  motion_.move_to(to, feed_ * left_over_.speed_percent / 100, t);
 }
 
 void VirtualPrinter::home(double t) {
   if (settings_.homing_fails) return kill(t, "echo:Homing Failed\n");
-  Point3 at = motion_.target();
-  motion_.move_to({at.x, at.y, at.z + 5}, rig::kLiftMmS, t);
-  motion_.move_to({0, 0, at.z + 5}, 50, t);
-  motion_.move_to({0, 0, 0}, rig::kLiftMmS, t);
+  motion_.home(t);
   offset_ = steps_zero_ = {};
   base_ = left_over_.offset;
   const Point3& shift = left_over_.home_offset;
