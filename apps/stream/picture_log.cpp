@@ -83,17 +83,15 @@ void PictureLog::add(const Seen& seen) {
 }
 
 // What the board's clock said, now that all frames are known.
-std::vector<std::byte> PictureLog::dated_times() {
+std::vector<double> PictureLog::dated_times() {
   const FrameTimeline timeline = timeline_of({}, arrivals_);
   std::vector<double> times;
   for (const FrameDate& date : timeline.dates) {
     kept_.push_back(date.doubt_s() <= kTrustedS);
     if (kept_.back()) times.push_back(first_s_ + date.time_s - timeline.dates.front().time_s);
   }
-  if (times.empty()) return {};
-  left_out_ = count_ - times.size();
-  const auto bytes = std::as_bytes(std::span(times));
-  return {bytes.begin(), bytes.end()};
+  if (!times.empty()) left_out_ = count_ - times.size();
+  return times;
 }
 
 void PictureLog::read_rows(const Spool& spool, std::size_t row_bytes, const ByteSink& sink) {
@@ -123,16 +121,16 @@ void PictureLog::write(std::map<std::string, std::string> metadata) {
   if (!problem_.empty()) throw FileError(output_.path, problem_);
   if (count_ == 0) return;  // nothing takes no name, and replaces nothing
   if (!std::isnan(began_s_)) metadata["began_s"] = supertac::format(began_s_);
-  if (count_ > 0 && arrivals_.size() == count_) {
-    const std::vector<std::byte> times = dated_times();
+  if (arrivals_.size() == count_) {
+    const std::vector<double> times = dated_times();
     const std::uint64_t kept = count_ - left_out_, row = format_.signals * sizeof(float);
     if (left_out_ > 0) metadata["left_out_frames"] = std::to_string(left_out_);
     if (times.empty()) metadata["doubt"] = "too short to know the board's clock: dated as the frames came";
     const auto rows = [&](const ByteSink& sink) { read_rows(volts_, row, sink); };
     if (!times.empty())
-      return write_safetensors(
-          output_, metadata,
-          {{"time_s", "F64", {kept}, times, {}}, {format_.tensor, "F32", {kept, format_.signals}, {}, rows}});
+      return write_safetensors(output_, metadata,
+                               {{"time_s", "F64", {kept}, std::as_bytes(std::span(times)), {}},
+                                {format_.tensor, "F32", {kept, format_.signals}, {}, rows}});
   }
   const auto from = [this](const Spool& spool) {
     return [this, &spool](const ByteSink& sink) { read_back(spool, sink); };

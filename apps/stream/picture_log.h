@@ -48,7 +48,7 @@ class PictureLog {
   void append(const Spool& spool, std::span<const std::byte> bytes);
   void check_room(const Seen& next);
   void read_back(const Spool& spool, const ByteSink& sink);
-  std::vector<std::byte> dated_times();
+  std::vector<double> dated_times();
   void read_rows(const Spool& spool, std::size_t row_bytes, const ByteSink& sink);
   [[noreturn]] void fail();
 

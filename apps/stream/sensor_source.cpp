@@ -52,7 +52,8 @@ class PortSource : public SensorSource {
     frame_ = std::move(*frame);
     SensorFrame out{.time_s = frame_.date.time_s,
                     .volts = frame_.signals,
-                    .arrived_s = arrived_s(frame_.arrival.time_s, speedup_)};
+                    // On the port's clock; what is not live arrives as it is taken.
+                    .arrived_s = live() ? frame_.arrival.time_s / speedup_ : monotonic_seconds()};
     if (by_arrival_) out.arrival = frame_.arrival;
     return out;
   }
@@ -106,16 +107,6 @@ class RecordingSource : public SensorSource {
 };
 
 }  // namespace
-
-SensorSource::SensorSource(double period_s, double filter_s, bool live)
-    : period_s_(period_s), filter_s_(filter_s), live_(live) {}
-
-SensorSource::SensorSource(double period_s, double filter_s, bool live, const Sensor& sensor)
-    : period_s_(period_s), filter_s_(filter_s), live_(live), sensor_(sensor) {}
-
-double SensorSource::arrived_s(double port_s, double speedup) const {
-  return live_ ? port_s / speedup : monotonic_seconds();
-}
 
 std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup, const std::string& capture) {
   OpenedPort opened = open_port(sensor, speedup);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/recordings/recording.h"
@@ -48,11 +49,8 @@ class SensorSource {
   bool live() const { return live_; }
 
  protected:
-  /// Of the rig, or of `sensor`.
-  SensorSource(double period_s, double filter_s, bool live);
-  SensorSource(double period_s, double filter_s, bool live, const Sensor& sensor);
-  /// Of a frame of a port whose clock is `speedup` times as fast; what is not live arrives as it is taken.
-  double arrived_s(double port_s, double speedup) const;
+  SensorSource(double period_s, double filter_s, bool live, Sensor sensor = {})
+      : period_s_(period_s), filter_s_(filter_s), live_(live), sensor_(std::move(sensor)) {}
 
  private:
   double period_s_, filter_s_;

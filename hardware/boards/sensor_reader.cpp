@@ -26,7 +26,7 @@ FrameReader::FrameReader(const Sensor& sensor, bool stored)
       clock_(clock_settings(sensor, stored)),
       rest_(sensor) {}
 
-double FrameReader::read(Port& port, double until, const Sink& sink) {
+std::span<const ReadFrame> FrameReader::read(Port& port, double until, double& time_s) {
   std::array<std::byte, kReadBytes> buffer;
   const Received got = port.read(buffer, until);
   const auto bytes = std::span(buffer).first(got.count);
@@ -34,25 +34,20 @@ double FrameReader::read(Port& port, double until, const Sink& sink) {
     for (const std::byte byte : bytes) without_frame_ += std::to_integer<char>(byte);
   if (decoder_->counters().frames == 0)
     for (const std::byte byte : bytes) text_bytes_ += is_text(byte) ? 1 : 0;
-  decode(bytes, got.time_s);
-  hand_over(sink);
-  return got.time_s;
+  return decode(bytes, time_s = got.time_s);
 }
 
-void FrameReader::finish(double time_s, const Sink& sink) {
+std::span<const ReadFrame> FrameReader::finish(double time_s) {
   const std::byte end{'\n'};
-  if (sensor_.frame.kind == FrameKind::text || sensor_.frame.kind == FrameKind::json)
-    decode({&end, 1}, time_s);
-  hand_over(sink);
-  close();
+  const bool lines = sensor_.frame.kind == FrameKind::text || sensor_.frame.kind == FrameKind::json;
+  return decode({&end, lines ? 1U : 0U}, time_s);
 }
 
-void FrameReader::decode(std::span<const std::byte> bytes, double time_s) {
-  count_ = 0;
+std::span<const ReadFrame> FrameReader::decode(std::span<const std::byte> bytes, double time_s) {
   arrivals_.clear();
   decoder_->push(bytes, [&](const DecodedFrame& decoded) {
-    if (count_ == frames_.size()) frames_.emplace_back().signals.resize(sensor_.array.signals());
-    ReadFrame& frame = frames_[count_];
+    if (arrivals_.size() == frames_.size()) frames_.emplace_back().signals.resize(sensor_.array.signals());
+    ReadFrame& frame = frames_[arrivals_.size()];
     sensor_.arrange(decoded.values, frame.signals);
     if (!std::ranges::all_of(frame.signals, [](float v) { return std::isfinite(v); })) {
       ++counters_.damaged, ++skipped_;
@@ -63,22 +58,17 @@ void FrameReader::decode(std::span<const std::byte> bytes, double time_s) {
     frame.suspect = decoded.suspect || paused, frame.jump = decoded.jump;
     first_ = false, last_frame_s_ = time_s;
     arrivals_.push_back(frame.arrival);
-    ++count_;
   });
-}
-
-void FrameReader::hand_over(const Sink& sink) {
-  if (count_ == 0) return;
+  if (arrivals_.empty()) return {};
   without_frame_.clear();
   clock_.date(arrivals_, dates_);
-  for (std::size_t n = 0; n < count_; ++n) {
+  for (std::size_t n = 0; n < dates_.size(); ++n) {
     ReadFrame& frame = frames_[n];
     frame.date = dates_[n];
     counters_.suspect += frame.suspect ? 1 : 0, counters_.jumps += frame.jump ? 1 : 0;
     rest_.follow(frame.date.time_s, frame.signals);
-    sink(frame);
   }
-  count_ = 0;
+  return std::span(frames_).first(dates_.size());
 }
 
 ReaderCounters FrameReader::counters() const {
@@ -104,10 +94,8 @@ SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor, const Reader
 void SensorReader::run() {
   double time_s = last_frame_s_;
   const auto read = [&](double until) {
-    time_s = frames_.read(*port_, until, sink_);
+    take(frames_.read(*port_, until, time_s));
     check_silence(time_s);
-    const std::lock_guard lock(mutex_);
-    counters_ = frames_.counters();
   };
   try {
     do read(port_->now() + kReadSlice);
@@ -121,19 +109,18 @@ void SensorReader::run() {
       before = frames_.counters().decoder.bytes;
       read(now);
     }
-    frames_.close();
   } catch (const PortEnded&) {  // nothing is wrong, but with one that was to go on
-    frames_.finish(time_s, sink_);
+    take(frames_.finish(time_s));
     const std::lock_guard lock(mutex_);
     if (live_)
       error_ = std::make_exception_ptr(PortUnplugged("sensor " + sensor_.name + " at " + port_->name() +
                                                      ": what it sends has ended; see whether its program "
                                                      "still runs, and start again"));
   } catch (...) {
-    frames_.close();
     const std::lock_guard lock(mutex_);
     error_ = std::current_exception();
   }
+  frames_.close();
   const std::lock_guard lock(mutex_);
   counters_ = frames_.counters();
   end();
@@ -194,12 +181,14 @@ void SensorReader::check_clock(double stamp_s, double arrival_s) {
                     " s a second; see whether its file names the right column and unit (s, ms, us) of time");
 }
 
-void SensorReader::take(const ReadFrame& frame) {
-  if (live_ && frame.arrival.stamp_s && !clock_checked_)
-    check_clock(*frame.arrival.stamp_s, frame.arrival.time_s);
+void SensorReader::take(std::span<const ReadFrame> frames) {
   std::unique_lock lock(mutex_);
   counters_ = frames_.counters();
-  put(lock, frame);
+  for (const ReadFrame& frame : frames) {
+    if (live_ && frame.arrival.stamp_s && !clock_checked_)
+      check_clock(*frame.arrival.stamp_s, frame.arrival.time_s);
+    put(lock, frame);
+  }
 }
 
 ReaderCounters SensorReader::counters() {

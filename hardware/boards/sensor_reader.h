@@ -3,8 +3,8 @@
 // oldest frames; a counter says how many.
 #pragma once
 
-#include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -37,13 +37,12 @@ struct ReaderCounters {
 /// Reads a port, and decodes and dates what comes. It has no thread: the same reads give the same frames.
 class FrameReader {
  public:
-  using Sink = std::function<void(const ReadFrame&)>;
   /// `stored`: the frames are those of a file, whose arrivals say nothing.
   explicit FrameReader(const Sensor& sensor, bool stored = false);
-  /// One read, until `until` at most. Hands over the frames that it completes and returns when it was.
-  double read(Port& port, double until, const Sink& sink);
+  /// The frames that one read completes, until `until` at most, and when it was. Valid until the next.
+  std::span<const ReadFrame> read(Port& port, double until, double& time_s);
   /// The last line of a source that has ended may lack its end.
-  void finish(double time_s, const Sink& sink);
+  std::span<const ReadFrame> finish(double time_s);
   /// No more will come: what is lost at the end is counted.
   void close() { clock_.finish(); }
   ReaderCounters counters() const;
@@ -52,15 +51,13 @@ class FrameReader {
   bool text() const { return text_bytes_ > 0.9 * static_cast<double>(decoder_->counters().bytes); }
 
  private:
-  void decode(std::span<const std::byte> bytes, double time_s);
-  void hand_over(const Sink& sink);
+  std::span<const ReadFrame> decode(std::span<const std::byte> bytes, double time_s);
 
   Sensor sensor_;
   std::unique_ptr<SensorDecoder> decoder_;
   FrameClock clock_;
   RestTracker rest_;
-  std::vector<ReadFrame> frames_;  // of one read
-  std::size_t count_ = 0;          // of these that are in use
+  std::vector<ReadFrame> frames_;  // of one read, and room for those of a larger one
   std::vector<FrameArrival> arrivals_;
   std::vector<FrameDate> dates_;
   double last_frame_s_ = 0, text_bytes_ = 0;
@@ -91,7 +88,7 @@ class SensorReader : public FrameQueue<ReadFrame> {
 
  private:
   void run();
-  void take(const ReadFrame& frame);
+  void take(std::span<const ReadFrame> frames);
   void check_silence(double time_s);
   void check_clock(double stamp_s, double arrival_s);
 
@@ -100,7 +97,6 @@ class SensorReader : public FrameQueue<ReadFrame> {
   Sensor sensor_;
   double silence_s_;
   FrameReader frames_;
-  FrameReader::Sink sink_ = [this](const ReadFrame& frame) { take(frame); };
   double last_frame_s_;
   SensorDecoder::Counters decoded_;  // when the newest frame came
   double went_s_ = 0, first_arrival_s_ = 0, checked_time_s_ = 0, longest_step_s_ = 0;

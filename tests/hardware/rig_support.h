@@ -95,16 +95,18 @@ inline RecorderReport replayed(const Journal& journal, RecorderSettings settings
                           std::make_unique<ReplayPort>(journal.of(Stream::printer), "printer"), settings);
 }
 
-/// A connected driver on a simulated rig, and where the head really is.
+/// A connected driver on a simulated rig, and where the head really is. `damaged`: of the printer's answers.
 struct PrinterBench {
-  explicit PrinterBench(RigSettings settings = running_rig())
-      : rig(settings), port(rig.printer_port()), printer(*port) {
+  explicit PrinterBench(const RigSettings& settings = running_rig(),
+                        std::vector<Tampering::Change> damaged = {})
+      : rig(settings), port(rig.printer_port()), printer(port) {
+    port.from_printer = std::move(damaged);
     printer.connect();
   }
   VirtualPrinter& firmware() { return rig.world().printer(); }
   Point3 head() { return firmware().head(rig.now()); }
   SimulatedRig rig;
-  std::unique_ptr<Port> port;
+  Tampering port;
   Printer printer;
 };
 

@@ -40,14 +40,10 @@ TEST(MachineState, EachLeftoverAloneIsSetAndPutBack) {
 TEST(MachineState, ADamagedAnswerIsNeitherRefusedNorPutBack) {
   for (const auto& [said, damaged] :
        {std::pair("FR:100%", "FR:150%"), {"Bed Leveling OFF", "Bed Leveling ON"}, {"  G21 ;", "  G20 ;"}}) {
-    SimulatedRig rig(running_rig());
-    Tampering port(rig.printer_port());
-    port.from_printer = {{said, damaged}};
-    Printer printer(port);
-    printer.connect();
-    printer.put_back();
-    EXPECT_TRUE(port.from_printer.empty());
-    EXPECT_EQ(rig.world().printer().left_over(), LeftOver{}) << said;
+    PrinterBench bench(running_rig(), {{said, damaged}});
+    bench.printer.put_back();
+    EXPECT_TRUE(bench.port.from_printer.empty());
+    EXPECT_EQ(bench.firmware().left_over(), LeftOver{}) << said;
   }
 }
 
@@ -66,12 +62,9 @@ TEST(MachineState, WhatIsNotPutBackIsSaid) {
 }
 
 TEST(MachineState, WhatStaysAnotherIsRefusedByName) {
-  SimulatedRig rig(running_rig());
-  Tampering port(rig.printer_port());
-  port.from_printer.assign(40, {"Bed Leveling OFF", "Bed Leveling ON"});
-  Printer printer(port);
+  const std::vector<Tampering::Change> damaged(40, {"Bed Leveling OFF", "Bed Leveling ON"});
   EXPECT_ERROR(
-      printer.connect(), PrinterRefused,
+      PrinterBench(running_rig(), damaged), PrinterRefused,
       "expected its mesh compensation at 'Bed Leveling OFF', found 'Bed Leveling ON' after M420 S0; set it "
       "by hand");
 }
@@ -175,14 +168,11 @@ TEST(MachineState, AHeatersErrorEndsARunOnlyWhereTheMachineHalts) {
 }
 
 TEST(MachineState, AQuoteIsMatchedWhereItStands) {
-  SimulatedRig rig(running_rig());
-  Tampering port(rig.printer_port());
-  Printer printer(port);
-  printer.connect();
-  printer.confirm_origin(rig::kMounted);
-  port.from_printer = {{"ok\n", "echo:Unknown command: \"1813\"M0114 R\"\nok\n"}};
-  EXPECT_NO_THROW(printer.link().command("M114 R"));
-  EXPECT_GT(printer.link().counters().faults, 0U);
+  PrinterBench bench;
+  bench.printer.confirm_origin(rig::kMounted);
+  bench.port.from_printer = {{"ok\n", "echo:Unknown command: \"1813\"M0114 R\"\nok\n"}};
+  EXPECT_NO_THROW(bench.printer.link().command("M114 R"));
+  EXPECT_GT(bench.printer.link().counters().faults, 0U);
 }
 
 TEST(MachineState, AFasterOrSlowerMachineIsNamedByItsSpeed) {

@@ -60,31 +60,25 @@ TEST(Printer, ArrivesWhereItWasSent) {
 // Klipper checks no line. The head starts 0.25 s behind its ok.
 TEST(Printer, ADamagedLineOfKlippersIsStoppedBeforeItMoves) {
   for (const auto& [sent, came] : {std::pair("Y110.000 Z", "Y11.000 Z"), {"Z131.810 F", "Z13\n1.810 F"}}) {
-    SimulatedRig rig(running_rig({.firmware = Firmware::klipper}));
-    Tampering port(rig.printer_port());
-    Printer printer(port);
-    printer.connect();
-    printer.confirm_origin(kMounted);
-    port.to_printer = {{sent, came}};
-    EXPECT_ERROR(printer.start_move({120, 110, 131.81}, 20), PositionError,
+    PrinterBench bench(running_rig({.firmware = Firmware::klipper}));
+    bench.printer.confirm_origin(kMounted);
+    bench.port.to_printer = {{sent, came}};
+    EXPECT_ERROR(bench.printer.start_move({120, 110, 131.81}, 20), PositionError,
                  "ordered X120.00 Y110.00 Z131.81, but Klipper took X120.00 Y1");
-    rig.run_for(5);
-    EXPECT_TRUE(rig.world().printer().halted());
-    EXPECT_EQ(rig.world().printer().head(rig.now()), kMounted);
+    bench.rig.run_for(5);
+    EXPECT_TRUE(bench.firmware().halted());
+    EXPECT_EQ(bench.head(), kMounted);
   }
 }
 
 TEST(Printer, ALineThatKlipperDidNotRunIsSentAgain) {
   for (const auto& [sent, came] : {std::pair("G1 X120", "P1 X120"), {"G1 X120", "G1\nX120"}}) {
-    SimulatedRig rig(running_rig({.firmware = Firmware::klipper}));
-    Tampering port(rig.printer_port());
-    Printer printer(port);
-    printer.connect();
-    printer.confirm_origin(kMounted);
-    port.to_printer = {{sent, came}};
-    printer.start_move({120, 110, 131.81}, 20);
-    printer.finish_move();
-    EXPECT_LT(distance(rig.world().printer().head(rig.now()), {120, 110, 131.81}), 1e-6);
+    PrinterBench bench(running_rig({.firmware = Firmware::klipper}));
+    bench.printer.confirm_origin(kMounted);
+    bench.port.to_printer = {{sent, came}};
+    bench.printer.start_move({120, 110, 131.81}, 20);
+    bench.printer.finish_move();
+    EXPECT_LT(distance(bench.head(), {120, 110, 131.81}), 1e-6);
   }
 }
 
@@ -162,15 +156,12 @@ TEST(Printer, SaysSoWithoutEmergencyParser) {
 }
 
 TEST(Printer, ADamagedPositionNeverLowersTheFinger) {
-  SimulatedRig rig(running_rig());
-  Tampering port(rig.printer_port());
-  Printer printer(port);
-  printer.connect();
-  printer.confirm_origin({99.7, 101.17, 131.81});
-  port.from_printer = {{"Z:131.81", "Z:11.81"}};  // a lost digit
-  printer.home();
-  EXPECT_TRUE(port.from_printer.empty());
-  EXPECT_EQ(moves_of(rig.world().printer())[0], "G1 Z141.810 F300.0");
+  PrinterBench bench;
+  bench.printer.confirm_origin(kMounted);
+  bench.port.from_printer = {{"Z:131.81", "Z:11.81"}};  // a lost digit
+  bench.printer.home();
+  EXPECT_TRUE(bench.port.from_printer.empty());
+  EXPECT_EQ(moves_of(bench.firmware())[0], "G1 Z141.810 F300.0");
 }
 
 TEST(Printer, EmergencyStopIsConfirmedByTheHalt) {

@@ -32,11 +32,8 @@ TEST(RealMarlin, TheLastPositionBeforeTheOkIsTheAnswer) {
 }
 
 TEST(RealMarlin, AReportTakenForAnAnswerEndsNoLegAndSwitchesNothingOff) {
-  SimulatedRig rig(running_rig());
-  Tampering port(rig.printer_port());
-  Printer printer(port);
-  printer.connect();
-  printer.confirm_origin(rig::kMounted);
+  PrinterBench bench;
+  bench.printer.confirm_origin(rig::kMounted);
   PalpationObserver observer;
   int slides = 0, polled = 0;
   observer.leg_started = [&](const Leg& leg) {
@@ -44,18 +41,18 @@ TEST(RealMarlin, AReportTakenForAnAnswerEndsNoLegAndSwitchesNothingOff) {
     if (leg.phase != Phase::slide) return;
     // The answer itself is damaged; a report of the queue's end stands before it.
     const std::string target = "X:99.70 Y:209.17 Z:91.81 E:0.00 Count X:0 Y:0 Z:0\n";
-    port.from_printer = {{"X:99.70 Y:101.17 Z:91.81 E", target + "X:99.7Y:101.17 Z:91.81 E"},
-                         {"X:99.70 Y:11", target + "X:99.70 Y:1.1"}};
+    bench.port.from_printer = {{"X:99.70 Y:101.17 Z:91.81 E", target + "X:99.7Y:101.17 Z:91.81 E"},
+                               {"X:99.70 Y:11", target + "X:99.70 Y:1.1"}};
   };
   observer.position = [&](const Leg& leg, const PositionSample& sample) {
     if (leg.phase == Phase::slide && sample.position.y < 209) ++polled;
   };
-  const PalpationOutcome outcome = Palpation(printer, {.passes = 1}, observer).run();
+  const PalpationOutcome outcome = Palpation(bench.printer, {.passes = 1}, observer).run();
   EXPECT_TRUE(outcome.complete);
   EXPECT_TRUE(outcome.realtime_position);
   EXPECT_EQ(slides, 1);
   EXPECT_GT(polled, 900) << "the polling stopped at a report of the target";
-  EXPECT_TRUE(port.from_printer.empty());
+  EXPECT_TRUE(bench.port.from_printer.empty());
 }
 
 TEST(RealMarlin, TheLineBeforeAHaltIsInTheError) {
