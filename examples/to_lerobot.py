@@ -8,7 +8,6 @@ observation.taxels [K,signals], in the unit of the file, are the K newest frames
 come in 1/FPS s; observation.position_mm [2] and observation.picture [height,width], of what all files have, are the
 newest.
 """
-import pathlib
 import sys
 
 if sys.argv[1:] in ([], ["-h"], ["--help"]):
@@ -22,28 +21,23 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset  # noqa: E402
 NAMES = {"volts": "observation.taxels", "position_mm": "observation.position_mm", "pictures": "observation.picture"}
 
 
-def episode(path):
-    tensors, metadata = supertac.read(path)  # "signals" of sensors that give no volts
-    return {"volts" if name == "signals" else name: values for name, values in tensors.items()}, metadata
-
-
 def main(out, fps, *files):
-    episodes = [episode(path) for path in map(pathlib.Path, files)]
-    common = [name for name in NAMES if all(name in tensors for tensors, _ in episodes)]
-    period_s = np.median(np.concatenate([np.diff(tensors["time_s"]) for tensors, _ in episodes]))
+    episodes = [vars(supertac.load(path)) for path in files]
+    common = [name for name in NAMES if all(one.get(name) is not None for one in episodes)]
+    period_s = np.median(np.concatenate([np.diff(one["time_s"]) for one in episodes]))
     between = np.arange(1 - max(1, round(1 / float(fps) / period_s)), 1)  # frames of touch up to the newest
-    shapes = {name: episodes[0][0][name].shape[1:] for name in common}
+    shapes = {name: episodes[0][name].shape[1:] for name in common}
     shapes["volts"] = (len(between), *shapes["volts"])
     features = {NAMES[name]: {"dtype": "float32", "shape": shapes[name], "names": None} for name in common}
     data = LeRobotDataset.create("local/tactile", int(fps), features, root=out, robot_type="supertac", use_videos=False)
-    for tensors, metadata in episodes:
-        times = tensors["time_s"]
+    for one in episodes:
+        times = one["time_s"]
         first = times[len(between) - 1]
         newest = np.searchsorted(times, np.arange(first, times[-1], 1 / float(fps)) + 1e-6 * period_s, "right") - 1
         for i in newest:
-            rows = {name: tensors[name][i + between if name == "volts" else i] for name in common}
+            rows = {name: one[name][i + between if name == "volts" else i] for name in common}
             data.add_frame({NAMES[name]: np.ascontiguousarray(row, "f4") for name, row in rows.items()}
-                           | {"task": "feel " + metadata.get("plate", "a surface")})
+                           | {"task": "feel " + one["metadata"].get("plate", "a surface")})
         data.save_episode()
     data.finalize()
     print(f"{out}: {len(episodes)} episodes of {', '.join(NAMES[name] for name in common)}")

@@ -8,7 +8,7 @@ the device live while one or two discs press it. `mat`: 10x6 taxels at 8 mm over
 two dead taxels, a row the wrong way round, a reset and an end of its range; `fingertip`: 3x3 taxels of three axes at 4
 mm; `net`: 16x16 at 5 mm in datagrams. Presses, skin and response are written down here, not taken from the simulator.
 Prints contact SSIM beside what interpolation has, the share of two discs drawn as two, pictures unlike training and
-seconds; exit code 1 where the last two or the SSIM are not enough. `--quick`: fewer presses and epochs.
+seconds; exit code 1 where the SSIM is too low or too many pictures are unlike training. `--quick`: fewer presses, epochs.
 """
 import json
 import os
@@ -31,7 +31,7 @@ BENCH = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(BENCH / "sensors"), str(BENCH), str(BENCH.parent / "python")]
 import baselines  # noqa: E402
 from source import commit_of, keep, source  # noqa: E402
-from supertac import files  # noqa: E402
+from supertac import read_pictures  # noqa: E402
 
 COLUMNS = ("device", "contact_ssim", "bicubic", "back_projection", "two_as_two", "unlike_training", "pictures", "seconds",
            "processor_s", "command", "commit")
@@ -237,15 +237,14 @@ class Way:
                                    "processor_s": round(used.children_user - before.children_user)}
 
     def score(self, live):
-        tensors, metadata = files.read(self.folder / "live.safetensors")
+        log = read_pictures(self.folder / "live.safetensors")
         sensor, told = (json.loads((self.folder / name).read_text()) for name in ("sensor.json", "live.json"))
-        signals, pictures = tensors.get("signals", tensors.get("volts")), tensors["pictures"]
-        place = self.places(sensor, live, signals)
-        drawn, truth = pictures[place >= 0], np.stack(live.truths)[place[place >= 0]]
+        place = self.places(sensor, live, log.volts)
+        drawn, truth = log.pictures[place >= 0], np.stack(live.truths)[place[place >= 0]]
         discs = np.array(live.discs)[place[place >= 0]]
         channels = sensor.get("channels", 1)
         low, high = sensor["range"]
-        taxels = ((signals[place >= 0] - low) / (high - low)).reshape(-1, sensor["rows"], sensor["columns"], channels)[..., -1]
+        taxels = ((log.volts[place >= 0] - low) / (high - low)).reshape(-1, sensor["rows"], sensor["columns"], channels)[..., -1]
         contact, two = np.ptp(truth, axis=(1, 2)) > 0.05, discs == 2
         figures = {"contact_ssim": baselines.ssim(drawn[contact], truth[contact]).mean()}
         for method in (baselines.bicubic, baselines.back_projection):

@@ -77,7 +77,7 @@ def _check(path: Path, recording: Recording) -> None:
         raise ValueError(f"{path}: its times do not increase; record or import it again")
 
 
-def contradiction(volts: np.ndarray, stated: dict) -> str:
+def contradiction(volts: Array, stated: dict[str, Any]) -> str:
     """Why these cannot be signals of a sensor that is stated so, as data/recordings/signal_range.h; "" where they can."""
     if "range" not in stated or not volts.size:
         return ""

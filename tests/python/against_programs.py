@@ -11,21 +11,12 @@ import dataclasses
 import importlib
 import json
 import multiprocessing
-import os
 import pathlib
-import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "python"))
-try:
-    import numpy as np
-except ImportError as missing:
-    print(f"skipped: {missing}")
-    sys.exit(77)
-import supertac  # noqa: E402
-from supertac.model import convolve, convolve_transposed  # noqa: E402
+from ours import LIBRARY, np, run, supertac
+from supertac.model import convolve, convolve_transposed
 
 
 def installed(name):
@@ -36,18 +27,10 @@ def installed(name):
         return None
 
 
-LIBRARY = pathlib.Path(sys.argv[1]).parent / "library/libsupertac.so"
-os.environ.setdefault("SUPERTAC_LIBRARY", str(LIBRARY))
 torch, onnxruntime = installed("torch"), installed("onnxruntime")
 TOLERANCE = 1e-5
 WINDOWS = int(sys.argv[2]) if len(sys.argv) > 2 else 100
 TRAINING = sys.argv[3:] or ["--epochs", "1", "--stride", "24"]
-
-
-def run(program, *words):
-    done = subprocess.run([pathlib.Path(sys.argv[1]) / program, *map(str, words)], capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(done.stderr)
 
 
 def with_two_channels(recording, path):

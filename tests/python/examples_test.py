@@ -13,16 +13,8 @@ import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "python"))
-try:
-    import numpy as np
-except ImportError as missing:
-    print(f"skipped: {missing}")
-    sys.exit(77)
-import supertac  # noqa: E402
+from ours import ROOT, np, run, supertac
 
-BIN = pathlib.Path(sys.argv[1])
 STAND_INS = {
     "pylsl.py": """
 import time
@@ -68,15 +60,10 @@ class LeRobotDataset:
 }
 
 
-def program(name, *words):
-    return subprocess.run([BIN / name, *map(str, words)], check=True, capture_output=True).stdout
-
-
 def example(folder, name, *words, given=b"", status=0):
     paths = os.pathsep.join([str(folder / "stand_ins"), str(ROOT / "python")])
-    library = os.environ.get("SUPERTAC_LIBRARY", str(BIN.parent / "library/libsupertac.so"))
     ran = subprocess.run([sys.executable, ROOT / "examples" / name, *map(str, words)], input=given, capture_output=True,
-                         env={**os.environ, "PYTHONPATH": paths, "SUPERTAC_LIBRARY": library})
+                         env={**os.environ, "PYTHONPATH": paths})
     assert ran.returncode == status, f"{name} {words}: {ran.returncode}\n{ran.stderr.decode()}"
     return ran.stdout.decode()
 
@@ -104,7 +91,7 @@ def mat(folder):
 
 def lines(folder, recording, *words):
     """Those of a stream, drawn and not."""
-    return program("supertac-stream", "--recording", recording, *words, "--out", "-", "--quiet", "--seconds", 4)
+    return run("supertac-stream", "--recording", recording, *words, "--out", "-", "--quiet", "--seconds", 4)
 
 
 def check_lines(folder, recording, words, signals, picture):
@@ -137,10 +124,10 @@ def main():
             (folder / "stand_ins" / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / "stand_ins" / path).write_text(text)
         helps(folder)
-        program("supertac-simulate", "--out", folder / "rig", "--plates", "6_Ridges", "--passes", 1, "--trials", 1, "--speeds",
+        run("supertac-simulate", "--out", folder / "rig", "--plates", "6_Ridges", "--passes", 1, "--trials", 1, "--speeds",
                 10, "--quiet")
         rig, model = next((folder / "rig").glob("*.safetensors")), folder / "model.safetensors"
-        program("supertac-train", "--data", folder / "rig", "--out", model, "--preset", "tiny", "--split", "none", "--epochs",
+        run("supertac-train", "--data", folder / "rig", "--out", model, "--preset", "tiny", "--split", "none", "--epochs",
                 1, "--stride", 48, "--quiet")
         touched = mat(folder)
         check_lines(folder, rig, ["--model", model], 16, 256)

@@ -10,13 +10,7 @@ import struct
 import sys
 import tempfile
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "python"))
-try:
-    import numpy as np
-except ImportError as missing:
-    print(f"skipped: {missing}")
-    sys.exit(77)
-import supertac  # noqa: E402
+from ours import np, supertac
 
 RECORDING = {"__metadata__": {"kind": "recording"}}
 

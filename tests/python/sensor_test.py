@@ -10,23 +10,13 @@ import json
 import multiprocessing
 import os
 import pathlib
-import subprocess
 import sys
 import tempfile
 import threading
 import time
 import tty
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BIN = pathlib.Path(sys.argv[1])
-sys.path.insert(0, str(ROOT / "python"))
-os.environ.setdefault("SUPERTAC_LIBRARY", str(BIN.parent / "library/libsupertac.so"))
-try:
-    import numpy as np
-except ImportError as missing:
-    print(f"skipped: {missing}")
-    sys.exit(77)
-import supertac  # noqa: E402
+from ours import np, run, supertac
 
 ORDER = [3, 2, 1, 0, 4, 5, 6, 7, 11, 10, 9, 8]
 MAT = {"name": "mat", "rows": 3, "columns": 4, "pitch_mm": 5, "unit": "counts", "pressed": "higher", "range": [40, 900],
@@ -106,8 +96,7 @@ def check_ten_lines(folder, sensor):
     (folder / "touched").mkdir()
     supertac.write_recording(folder / "touched/a.safetensors", recording)
     assert 195 <= len(recording.time_s) <= 205 and "in counts" in repr(supertac.load(folder / "touched/a.safetensors"))
-    subprocess.run([BIN / "supertac-simulate", "--sensor", sensor.path, "--presses", "60", "--out", folder / "pressed",
-                    "--quiet"], check=True)
+    run("supertac-simulate", "--sensor", sensor.path, "--presses", 60, "--out", folder / "pressed", "--quiet")
     supertac.train("frame", folder / "pressed", folder / "mat.safetensors", epochs=1, stride=8, split="none")
     live = supertac.LiveWindow(supertac.load(folder / "mat.safetensors"), sensor.rate_hz)
     pictures = [live.push(frame.time_s, frame.signals) for frame, _ in zip(sensor.open(), range(30))]
@@ -135,8 +124,8 @@ def check_live(folder, seconds):
     rig = {"name": "fast", "rows": 4, "columns": 4, "pitch_mm": 3, "unit": "V", "pressed": "lower", "range": [2.09, 2.45],
            "rate_hz": 1008, "frame": {"kind": "text", "separator": ",", "time": {"column": 0, "unit": "ms"}}}
     (folder / "rig").mkdir()
-    subprocess.run([BIN / "supertac-simulate", "--out", folder / "rig", "--plates", "6_Ridges", "--passes", "1", "--trials",
-                    "1", "--speeds", "10", "--quiet"], check=True)
+    run("supertac-simulate", "--out", folder / "rig", "--plates", "6_Ridges", "--passes", 1, "--trials", 1, "--speeds", 10,
+        "--quiet")
     supertac.train("paper", folder / "rig", folder / "paper.safetensors", epochs=1, stride=64, split="none")
     model = supertac.load(folder / "paper.safetensors")
     master, slave = os.openpty()

@@ -16,29 +16,21 @@ import sys
 import tempfile
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "python"))
+from ours import BIN, ROOT, np, run, supertac
+
 try:
-    import numpy as np
     from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
     from rosbags.typesys import Stores, get_typestore
 except ImportError as missing:
     print(f"skipped: {missing}")
     sys.exit(77)
-import supertac  # noqa: E402
 
 TOPICS = {"/supertac/taxels": "std_msgs/msg/Float32MultiArray", "/supertac/picture": "sensor_msgs/msg/Image",
           "/supertac/half_width": "sensor_msgs/msg/Image", "/supertac/total_force": "std_msgs/msg/Float32",
           "/supertac/saturated": "std_msgs/msg/UInt32"}
 SENSOR = """{"name": "mat", "rows": 2, "columns": 3, "pitch_mm": 5, "channels": 1, "unit": "counts", "pressed": "higher",
 "range": [40, 900], "rate_hz": 100, "port": "udp::%d", "frame": {"kind": "text", "separator": ","}}"""
-
-
-def run(program, *words):
-    done = subprocess.run([pathlib.Path(sys.argv[1]) / program, *map(str, words)], capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(done.stderr)
 
 
 def contents(path):
@@ -138,7 +130,7 @@ def check_live(folder):
     port = device.getsockname()[1] % 60000 + 1024  # another than the device's own
     sensor.write_text(SENSOR % port)
     before = time.time()
-    program = subprocess.Popen([pathlib.Path(sys.argv[1]) / "supertac-stream", "--sensor", sensor, "--mcap", out, "--seconds",
+    program = subprocess.Popen([BIN / "supertac-stream", "--sensor", sensor, "--mcap", out, "--seconds",
                                 "2", "--quiet"], stdout=subprocess.DEVNULL)
     while program.poll() is None:
         device.sendto(b"1,2,3,40,50,60", ("127.0.0.1", port))
