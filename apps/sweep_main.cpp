@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <limits>
 #include <set>
 #include <span>
@@ -62,22 +61,19 @@ constexpr Axis kAxes[] = {{"timesteps", &SuperTacSettings::timesteps, "_t"},
                           {"channels", &SuperTacSettings::channels, "_c"},
                           {"rcabs", &SuperTacSettings::rcabs, "_r"}};
 
-// "paper_t256_l10_x4_c32_r3_s0", and what was left out: all before "_s0" is the same for all seeds.
+// What was left out, as it may stand in a file's name and in a cell.
+std::string left_out_of(const Recipe& recipe) {
+  std::string text = joined(recipe.leave_out, "_");
+  for (char& c : text)
+    if (std::string_view(",/\"\\\n").find(c) != std::string_view::npos) c = '-';
+  return text;
+}
+// "paper_t256_l10_x4_c32_r3_s0", and what was left out.
 std::string model_name_of(const Recipe& recipe) {
   std::string name = recipe.model.preset;
   for (const Axis& axis : kAxes) name += axis.letter + std::to_string(recipe.model.*axis.setting);
-  name += "_s" + std::to_string(recipe.seed);
-  for (const std::string& one : recipe.leave_out) name += "_" + one;
-  for (char& c : name)
-    if (std::string_view(",/\"\\\n").find(c) != std::string_view::npos) c = '-';
-  return name;
-}
-// Where "_s0" begins.
-std::size_t seed_in(const std::string& model) {
-  std::size_t at = model.find("_s");
-  while (at != std::string::npos && (at + 2 >= model.size() || model[at + 2] < '0' || model[at + 2] > '9'))
-    at = model.find("_s", at + 1);
-  return std::min(at, model.size());
+  const std::string left_out = left_out_of(recipe);
+  return name + "_s" + std::to_string(recipe.seed) + (left_out.empty() ? "" : "_" + left_out);
 }
 
 // What can be left out of the recordings, each once: their groups, or their plates.
@@ -115,13 +111,12 @@ std::vector<Recipe> grid_of(const Arguments& a) {
     grid = finer;
   }
   std::vector<Recipe> all;
+  std::vector<std::vector<std::string>> leave_out;  // one after the other, of every recipe
   for (Recipe& recipe : grid) {
     as_usage([&] { recipe.check(); });
-    std::vector<std::vector<std::string>> leave_out = {recipe.leave_out};
-    if (recipe.leave_out == std::vector<std::string>{"each"}) {
-      leave_out.clear();
+    if (leave_out.empty() && a.text("leave-out") == "each")
       for (const std::string& one : each_of(a, recipe.split)) leave_out.push_back({one});
-    }
+    if (leave_out.empty()) leave_out = {recipe.leave_out};
     for (const std::vector<std::string>& left_out : leave_out)
       for (const Dim seed : whole_numbers(a, "seeds"))
         recipe.seed = static_cast<std::uint64_t>(seed), recipe.leave_out = left_out, all.push_back(recipe);
@@ -151,10 +146,18 @@ void check_settings(const Arguments& a) {
 
 // sweep.csv: one row for each model.
 constexpr const char* kColumns =
-    "model,preset,timesteps,latent,scale,channels,rcabs,seed,split,left_out,windows,ssim,psnr_db,phase,phase_"
-    "floor,"
-    "position_mm,all_windows,all_ssim,all_psnr_db,all_phase,all_phase_floor,all_position_mm,median_us,p99_us,"
-    "mmac,parameters,train_s,steps,commit";
+    "model,preset,timesteps,latent,scale,channels,rcabs,seed,split,left_out,windows,ssim,psnr_db,phase,"
+    "phase_floor,position_mm,all_windows,all_ssim,all_psnr_db,all_phase,all_phase_floor,all_position_mm,"
+    "median_us,p99_us,mmac,parameters,train_s,steps,commit";
+
+struct Measured {
+  std::string model, left_out;
+  double ssim, median_us;  // NaN for a figure over no windows
+  // What stands before "_s0": the same for all seeds, and for all that was left out.
+  std::string configuration() const {
+    return model.substr(0, model.rfind("_s", model.size() - left_out.size() - 2));
+  }
+};
 
 class Table {
  public:
@@ -188,11 +191,16 @@ class Table {
     for (const auto& row : rows_) content += joined(row) + "\n";
     write_file(path_, content);
   }
-  // Of every row behind the first: `use(model, value)`; NaN for a figure over no windows.
-  void each(const std::string& column, const std::function<void(const std::string&, double)>& use) const {
-    const auto at = std::ranges::find(rows_.front(), column) - rows_.front().begin();
-    for (std::size_t i = 1; i < rows_.size(); ++i)
-      use(rows_[i].front(), parse_double(rows_[i].at(static_cast<std::size_t>(at))).value_or(std::nan("")));
+  std::vector<Measured> measured() const {
+    std::vector<Measured> all;
+    for (const auto& row : std::span(rows_).subspan(1)) {
+      const auto cell = [&](const char* column) {
+        return row.at(static_cast<std::size_t>(std::ranges::find(rows_[0], column) - rows_[0].begin()));
+      };
+      const auto number = [&](const char* column) { return parse_double(cell(column)).value_or(NAN); };
+      all.push_back({cell("model"), cell("left_out"), number("ssim"), number("median_us")});
+    }
+    return all;
   }
 
  private:
@@ -225,7 +233,7 @@ Json row_of(const Recipe& recipe, const TrainingRun& training, const ZoneMetrics
   for (const Axis& axis : kAxes) row[axis.name] = s.*axis.setting;
   row["seed"] = recipe.seed;
   row["split"] = name_of(recipe.split);
-  row["left_out"] = joined(recipe.leave_out, " ");
+  row["left_out"] = left_out_of(recipe);
   for (const auto& [prefix, m] :
        {std::pair<std::string, Metrics>{"", scores.contact()}, {"all_", scores.all()}}) {
     row[prefix + "windows"] = m.windows;
@@ -274,16 +282,13 @@ struct Configuration {
 };
 
 // Fastest first.
-std::vector<Configuration> configurations(const Table& table) {
+std::vector<Configuration> configurations(const std::vector<Measured>& models) {
   std::vector<Configuration> all;
-  const auto of = [&](const std::string& model) -> Configuration& {
-    const std::string name = model.substr(0, seed_in(model));
-    const auto found = std::ranges::find(all, name, &Configuration::name);
-    return found != all.end() ? *found : all.emplace_back(name);
-  };
-  table.each("ssim",
-             [&](const std::string& model, double value) { of(model).ssim += value, ++of(model).seeds; });
-  table.each("median_us", [&](const std::string& model, double value) { of(model).median_us += value; });
+  for (const Measured& m : models) {
+    auto at = std::ranges::find(all, m.configuration(), &Configuration::name);
+    if (at == all.end()) at = all.insert(at, {m.configuration()});
+    at->ssim += m.ssim, at->median_us += m.median_us, ++at->seeds;
+  }
   for (Configuration& c : all)
     c.ssim /= static_cast<double>(c.seeds), c.median_us /= static_cast<double>(c.seeds);
   std::ranges::stable_sort(all, {}, &Configuration::median_us);
@@ -294,18 +299,15 @@ std::vector<Configuration> configurations(const Table& table) {
 }
 
 // Models of which something was left out and tested, the worst first; empty where nothing was.
-std::vector<std::pair<double, std::string>> left_out_models(const Table& table) {
-  std::vector<std::pair<double, std::string>> models;
-  table.each("ssim", [&](const std::string& model, double value) {
-    if (model.find('_', std::min(model.size(), seed_in(model) + 1)) != std::string::npos)
-      models.emplace_back(value, model);
-  });
-  std::ranges::sort(models);
+std::vector<Measured> left_out_models(std::vector<Measured> models) {
+  std::erase_if(models, [](const Measured& m) { return m.left_out.empty(); });
+  std::ranges::stable_sort(models, {}, [](const Measured& m) { return std::isnan(m.ssim) ? -1 : m.ssim; });
   return models;
 }
 
 // Points are labelled by the numbers of the table below.
-std::string page_of(const std::vector<Configuration>& all, const Table& table, const Arguments& a) {
+std::string page_of(const std::vector<Configuration>& all, const std::vector<Measured>& left_out,
+                    const Arguments& a) {
   ChartSeries front{.name = "Pareto front", .points = {}, .line = true, .dots = true};
   ChartSeries others{.name = "dominated", .points = {}, .line = false, .dots = true};
   std::string rows;
@@ -318,12 +320,12 @@ std::string page_of(const std::vector<Configuration>& all, const Table& table, c
             "&ensp;" + escaped(c.name) + "</td><td>" + std::to_string(c.seeds) + "</td><td>" +
             format(c.median_us, 1) + "</td><td>" + format(c.ssim, 3) + "</td></tr>";
   }
-  std::string left_out;
-  for (const auto& [ssim, model] : left_out_models(table))
-    left_out += "<tr><td>" + escaped(model) + "</td><td>" + format(ssim, 3) + "</td></tr>";
-  if (!left_out.empty())
-    left_out = page_section("Each left out in turn", "the worst first: tested on what it has not seen",
-                            page_table({"model, and what it has not seen", "contact SSIM"}, left_out));
+  std::string unseen;
+  for (const Measured& m : left_out)
+    unseen += "<tr><td>" + escaped(m.model) + "</td><td>" + format(m.ssim, 3) + "</td></tr>";
+  if (!unseen.empty())
+    unseen = page_section("Each left out in turn", "the worst first: tested on what it has not seen",
+                          page_table({"model, and what it has not seen", "contact SSIM"}, unseen));
   return result_page(
       "SuperTac sweep",
       page_section(
@@ -333,7 +335,7 @@ std::string page_of(const std::vector<Configuration>& all, const Table& table, c
           chart_svg("Contact SSIM", {.label = "one picture, us", .logarithmic = true},
                     {.label = "SSIM", .most = 1}, {front, others}) +
               page_table({"configuration", "models", "one picture, us", "contact SSIM"}, rows)) +
-          left_out +
+          unseen +
           page_section("What made this page", "",
                        page_facts({{"command", a.command_line()}, {"commit", commit()}})));
 }
@@ -353,8 +355,9 @@ int run(Arguments& a) {
       table.add(
           measure(a, grid[i], std::to_string(i + 1) + " of " + std::to_string(grid.size()) + " " + name));
   }
-  const std::vector<Configuration> all = configurations(table);
-  write_file(out + "/chart.html", page_of(all, table, a));
+  const std::vector<Configuration> all = configurations(table.measured());
+  const std::vector<Measured> left_out = left_out_models(table.measured());
+  write_file(out + "/chart.html", page_of(all, left_out, a));
   a.print("Pareto front, fastest first:");
   Json result = {{"configurations", all.size()}};
   for (const Configuration& c : all) {
@@ -364,11 +367,10 @@ int run(Arguments& a) {
     result["front"].push_back(
         {{"configuration", c.name}, {"seeds", c.seeds}, {"ssim", c.ssim}, {"median_us", c.median_us}});
   }
-  const auto left_out = left_out_models(table);
   if (!left_out.empty()) a.print("Each left out in turn, the worst first:");
-  for (const auto& [ssim, model] : left_out) {
-    a.print("  " + model + ": SSIM " + format(ssim, 3));
-    result["left_out"].push_back({{"model", model}, {"ssim", ssim}});
+  for (const Measured& m : left_out) {
+    a.print("  " + m.model + ": SSIM " + format(m.ssim, 3));
+    result["left_out"].push_back({{"model", m.model}, {"ssim", m.ssim}});
   }
   a.write_json(result);
   return kExitOk;

@@ -261,10 +261,10 @@ int supertac_map_cells(const supertac_map* map, int* height, int* width, double 
     if (values == nullptr && errors == nullptr) return 0;
     MapCells cells = map->surface.cells(felt);
     if (values != nullptr) std::ranges::copy(cells.values, values);
-    if (errors != nullptr) std::fill_n(errors, cells.values.size(), std::numeric_limits<float>::quiet_NaN());
-    map->model->file.interval().half_widths(cells.values, static_cast<std::size_t>(felt.width), cells.errors,
-                                            cells.errors);
-    if (errors != nullptr) std::ranges::copy(cells.errors, errors);
+    if (errors == nullptr) return 0;
+    std::fill_n(errors, cells.values.size(), std::numeric_limits<float>::quiet_NaN());
+    map->model->file.interval().half_widths(cells.values, felt.width, cells.errors, cells.errors);
+    std::ranges::copy(cells.errors, errors);
     return 0;
   });
 }

@@ -88,8 +88,8 @@ nlohmann::ordered_json MapScores::to_json() const {
 
 NamedMap MapScores::named(const std::string& name, const SurfaceMap& map, std::size_t pass) const {
   NamedMap named{.name = name, .cells = map.cells(map.felt()), .cell_mm = map.grid().pixel_mm};
-  model_.interval().half_widths(named.cells.values, static_cast<std::size_t>(named.cells.region.width),
-                                named.cells.errors, named.cells.errors);
+  model_.interval().half_widths(named.cells.values, named.cells.region.width, named.cells.errors,
+                                named.cells.errors);
   if (windows_.truth_is_measured(pass)) return named;
   const MapRegion& r = named.cells.region;
   for (std::int64_t j = 0; j < r.height; ++j)

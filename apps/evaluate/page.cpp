@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/evaluate/score_tables.h"
 #include "apps/web/chart.h"
 #include "apps/web/encode.h"
 #include "apps/web/result_page.h"
@@ -145,7 +146,8 @@ std::vector<EvaluationPage::ScoredWindow> EvaluationPage::extremes(bool best, co
                                                                    std::size_t most) const {
   std::vector<ScoredWindow> sorted, chosen;
   for (const ScoredWindow& one : contact_)
-    if (group.empty() || group_of(one.window) == group) sorted.push_back(one);
+    if (group.empty() || group_of(windows_.passes()[windows_.pass_of(one.window)]) == group)
+      sorted.push_back(one);
   std::sort(sorted.begin(), sorted.end(), [&](const ScoredWindow& a, const ScoredWindow& b) {
     return std::pair(best ? -a.ssim : a.ssim, a.window) < std::pair(best ? -b.ssim : b.ssim, b.window);
   });
@@ -179,19 +181,13 @@ std::vector<std::uint32_t> EvaluationPage::film_frames(std::span<const std::uint
 
 std::string EvaluationPage::name_of(std::uint32_t window) const {
   const WindowSet::Pass& pass = windows_.passes()[windows_.pass_of(window)];
-  return (pass.group.empty() || pass.group == pass.plate ? "" : pass.group + ", ") + pass.plate + ", trial " +
+  return (group_of(pass) == pass.plate ? "" : pass.group + ", ") + pass.plate + ", trial " +
          std::to_string(pass.trial) + ", pass " + std::to_string(pass.pass) +
          (pass.speed_mm_s > 0 ? ", " + format(pass.speed_mm_s) + " mm/s" : "");
 }
 
-std::string EvaluationPage::group_of(std::uint32_t window) const {
-  const WindowSet::Pass& pass = windows_.passes()[windows_.pass_of(window)];
-  return pass.group.empty() ? pass.plate : pass.group;
-}
-
 std::string EvaluationPage::by_group(const nlohmann::ordered_json& groups) const {
-  const bool grouped =
-      std::ranges::any_of(windows_.passes(), [](const auto& pass) { return !pass.group.empty(); });
+  const bool grouped = has_groups(windows_);
   std::string rows;
   for (const auto& m : groups)
     rows += "<tr><td>" + escaped(m["name"].get<std::string>()) + "</td>" +
@@ -264,12 +260,11 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
                                  const nlohmann::ordered_json& result,
                                  const std::vector<std::pair<std::string, std::string>>& made_by) const {
   const std::vector<ScoredWindow> best = extremes(true), worst = extremes(false);
-  std::vector<ScoredWindow> all_groups;
+  std::vector<ScoredWindow> of_groups;
   const std::size_t groups = result["groups"].size();
   for (std::size_t i = 0; i < std::min(groups, kGroups) && groups > 1; ++i)
     std::ranges::copy(extremes(false, result["groups"][i]["name"].get<std::string>(), kOfGroup),
-                      std::back_inserter(all_groups));
-  const std::vector<ScoredWindow>& of_groups = all_groups;
+                      std::back_inserter(of_groups));
   const std::vector<std::uint32_t> frames = film_frames(test);
   std::vector<std::uint32_t> chosen = frames;
   for (const std::vector<ScoredWindow>* some : {&best, &worst, &of_groups})

@@ -42,7 +42,6 @@ class EvaluationPage {
   /// Of all groups, or of one.
   std::vector<ScoredWindow> extremes(bool best, const std::string& group = {},
                                      std::size_t most = kShown) const;
-  std::string group_of(std::uint32_t window) const;
   std::vector<std::uint32_t> film_frames(std::span<const std::uint32_t> test) const;
   std::string by_group(const nlohmann::ordered_json& groups) const;
   std::string shown(const std::string& title, const std::string& note,

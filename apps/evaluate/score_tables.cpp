@@ -97,14 +97,15 @@ nlohmann::ordered_json PassScores::to_json() const {
   return json;
 }
 
-GroupScores::GroupScores(const WindowSet& windows)
-    : windows_(windows), by_group_(std::ranges::any_of(windows.passes(), [](const WindowSet::Pass& pass) {
-        return !pass.group.empty();
-      })) {}
+const std::string& group_of(const WindowSet::Pass& pass) {
+  return pass.group.empty() ? pass.plate : pass.group;
+}
+bool has_groups(const WindowSet& windows) {
+  return std::ranges::any_of(windows.passes(), [](const auto& pass) { return !pass.group.empty(); });
+}
 
 void GroupScores::add(std::uint32_t window, std::span<const float> picture, std::span<const float> truth) {
-  const WindowSet::Pass& pass = windows_.passes()[windows_.pass_of(window)];
-  groups_.try_emplace(by_group_ ? pass.group : pass.plate, windows_.image())
+  groups_.try_emplace(group_of(windows_.passes()[windows_.pass_of(window)]), windows_.image())
       .first->second.add(picture, truth, windows_.zone(window), windows_.contact_level());
 }
 
@@ -129,8 +130,8 @@ std::vector<std::string> GroupScores::lines() const {
       break;
     }
     if (contact.windows > 0)
-      lines.push_back((by_group_ ? "group " : "plate ") + name + ": contact SSIM " + format(contact.ssim, 3) +
-                      ", PSNR " + format(contact.psnr_mean_db, 2) + " dB, " +
+      lines.push_back((by_group() ? "group " : "plate ") + name + ": contact SSIM " +
+                      format(contact.ssim, 3) + ", PSNR " + format(contact.psnr_mean_db, 2) + " dB, " +
                       std::to_string(contact.windows) + " windows");
   }
   return lines;
@@ -177,12 +178,12 @@ void TrustScores::add(const Drawn& drawn) {
     unlike_ += model_.novelty->unlike_training(signal_features(drawn.input, windows_.array())) ? 1 : 0;
   }
   if (!predicted_error.empty())
-    coverage_.add(windows_.pass_of(drawn.example), drawn.pictures[0],
-                  static_cast<std::size_t>(windows_.image().width), drawn.target, predicted_error);
+    coverage_.add(windows_.pass_of(drawn.example), drawn.pictures[0], windows_.image().width, drawn.target,
+                  predicted_error);
 }
 
 std::vector<std::pair<std::string, IntervalCoverage::Held>> TrustScores::classes() const {
-  constexpr const char* kHeights[] = {"true 0", "true to 0.2", "true to 0.5", "true above 0.5"};
+  constexpr const char* kHeights[] = {"0", "to 0.2", "to 0.5", "above 0.5"};
   std::vector<std::pair<std::string, IntervalCoverage::Held>> classes;
   for (std::size_t h = 0; h < IntervalCoverage::kHeights; ++h)
     classes.emplace_back(kHeights[h], coverage_.of_height(h));
@@ -199,7 +200,7 @@ std::vector<std::string> TrustScores::lines() const {
                     percent(IntervalCoverage::kCovered) + " at each height of the truth)");
   std::string truths;
   for (const auto& [name, held] : classes())
-    truths += (truths.empty() ? "" : ", ") + name.substr(5) + " " + percent(held.share) + " (+-" +
+    truths += (truths.empty() ? "" : ", ") + name + " " + percent(held.share) + " (+-" +
               format(held.half_width, 2) + ")";
   if (!truths.empty()) lines.push_back("intervals hold by height of the truth: " + truths);
   if (judged_ > 0)
@@ -216,7 +217,7 @@ nlohmann::ordered_json TrustScores::to_json() const {
     json["coverage"] = coverage_.share();
     json["interval_found"] = coverage_.found().text();
     for (const auto& [name, held] : classes())
-      json["coverage_of"][name] = {
+      json["coverage_of"]["true " + name] = {
           {"share", number(held.share)}, {"half_width", number(held.half_width)}, {"pixels", held.pixels}};
   }
   if (judged_ > 0) json["unlike_training"] = static_cast<double>(unlike_) / static_cast<double>(judged_);

@@ -81,23 +81,26 @@ class PassScores {
   std::map<std::size_t, ScoreSums> passes_;
 };
 
-/// By the recordings' groups; by plate where they have none.
+/// Of a pass; its plate where it has none.
+const std::string& group_of(const WindowSet::Pass& pass);
+bool has_groups(const WindowSet& windows);
+
+/// By group_of() the passes.
 class GroupScores {
  public:
-  explicit GroupScores(const WindowSet& windows);
+  explicit GroupScores(const WindowSet& windows) : windows_(windows) {}
   void add(std::uint32_t window, std::span<const float> picture, std::span<const float> truth);
   /// A line for each group, those with the lowest contact SSIM first, eight at most; none for a single one.
   std::vector<std::string> lines() const;
   /// [{"name", "contact": {...}, "all": {...}}], in the same order.
   nlohmann::ordered_json to_json() const;
-  bool by_group() const { return by_group_; }
+  bool by_group() const { return has_groups(windows_); }
   std::size_t size() const { return groups_.size(); }
 
  private:
   std::vector<std::pair<std::string, const ZoneMetrics*>> worst_first() const;
 
   const WindowSet& windows_;
-  bool by_group_;
   std::map<std::string, ZoneMetrics> groups_;
 };
 
@@ -121,10 +124,10 @@ class TrustScores {
   /// "true to 0.2", "true to 0.5", "true above 0.5"}, "unlike_training"}
   nlohmann::ordered_json to_json() const;
 
+ private:
   /// By how high the truth is, in words; without those that no pixel belongs to.
   std::vector<std::pair<std::string, IntervalCoverage::Held>> classes() const;
 
- private:
   const WindowSet& windows_;
   const ModelFile& model_;
   IntervalCoverage coverage_;

@@ -90,8 +90,7 @@ std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& wi
                       .drawn = {drawn.begin(), drawn.end()},
                       .truth = {truth.begin(), truth.end()},
                       .half_widths = {}};
-      interval.half_widths(drawn, static_cast<std::size_t>(windows.image().width), b.predicted_error(n),
-                           one.half_widths);
+      interval.half_widths(drawn, windows.image().width, b.predicted_error(n), one.half_widths);
       shown.push_back(std::move(one));
     }
     return true;

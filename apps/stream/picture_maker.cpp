@@ -78,8 +78,8 @@ std::span<const float> PictureMaker::picture() {
   if (!window_.window(input_.values())) return {};
   output_ = network_.estimate(input_);
   if (output_.predicted_error.defined())
-    interval_.half_widths(output_.picture.values(), static_cast<std::size_t>(image().width),
-                          output_.predicted_error.values(), half_widths_);
+    interval_.half_widths(output_.picture.values(), image().width, output_.predicted_error.values(),
+                          half_widths_);
   if (model_.novelty) {
     signal_features(input_.values(), model_.array(), features_);
     distance_ = model_.novelty->distance(features_);

@@ -163,8 +163,7 @@ void Stream::write_map() const {
 
 NamedMap Stream::named_map() const {
   MapCells cells = map_->cells(map_->felt());
-  maker_->interval().half_widths(cells.values, static_cast<std::size_t>(cells.region.width), cells.errors,
-                                 cells.errors);
+  maker_->interval().half_widths(cells.values, cells.region.width, cells.errors, cells.errors);
   return {"surface", std::move(cells), map_->grid().pixel_mm};
 }
 

@@ -21,12 +21,13 @@ float steepest(std::span<const float> picture, std::size_t width, std::size_t pi
 
 }  // namespace
 
-void PixelInterval::half_widths(std::span<const float> picture, std::size_t width,
+void PixelInterval::half_widths(std::span<const float> picture, std::int64_t width,
                                 std::span<const float> predicted_error, std::vector<float>& widths) const {
   widths.resize(predicted_error.size());
   const auto along = static_cast<float>(shift), beside = static_cast<float>(factor);
   for (std::size_t i = 0; i < widths.size(); ++i)
-    widths[i] = along * steepest(picture, width, i) + beside * at_least(predicted_error[i]);
+    widths[i] =
+        along * steepest(picture, static_cast<std::size_t>(width), i) + beside * at_least(predicted_error[i]);
 }
 
 std::string PixelInterval::text() const { return (shift > 0 ? format(shift) + "," : "") + format(factor); }
@@ -41,7 +42,7 @@ std::optional<PixelInterval> PixelInterval::read(const std::string& text) {
   return PixelInterval{*shift, *factor};
 }
 
-void IntervalCoverage::add(std::size_t pass, std::span<const float> picture, std::size_t width,
+void IntervalCoverage::add(std::size_t pass, std::span<const float> picture, std::int64_t width,
                            std::span<const float> truth, std::span<const float> predicted_error) {
   if (passes_.empty() || passes_.back().number != pass) passes_.push_back({.number = pass});
   judged_.half_widths(picture, width, predicted_error, widths_);

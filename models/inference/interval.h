@@ -29,7 +29,7 @@ struct PixelInterval {
   /// Of pictures [height][width] and as many predicted errors, which may be `widths` itself; no heap once
   /// that is large. Empty where `predicted_error` is. NaN for pixels that are NaN, which count as no
   /// neighbours.
-  void half_widths(std::span<const float> picture, std::size_t width, std::span<const float> predicted_error,
+  void half_widths(std::span<const float> picture, std::int64_t width, std::span<const float> predicted_error,
                    std::vector<float>& widths) const;
 
   /// "0.75,0.55", or "1.45" for a factor without a shift, as older files have it; back from it, or nothing
@@ -54,7 +54,7 @@ class IntervalCoverage {
 
   explicit IntervalCoverage(const PixelInterval& judged = {}) : judged_(judged) {}
   /// One picture, all three [height][width]; windows of a pass come one behind the other.
-  void add(std::size_t pass, std::span<const float> picture, std::size_t width, std::span<const float> truth,
+  void add(std::size_t pass, std::span<const float> picture, std::int64_t width, std::span<const float> truth,
            std::span<const float> predicted_error);
   bool empty() const { return passes_.empty(); }
   // Not to be asked when empty():

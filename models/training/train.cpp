@@ -119,8 +119,8 @@ std::map<std::string, std::string> trained_origin(const Trainer& trainer, const 
   IntervalCoverage coverage;
   for_each_output(Ensemble({Prepared(trainer.model())}), *task.windows, tested, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < b.size() && !b.predicted_errors.empty(); ++n)
-      coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n),
-                   static_cast<std::size_t>(task.windows->image().width), b.target(n), b.predicted_error(n));
+      coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n), task.windows->image().width,
+                   b.target(n), b.predicted_error(n));
     return true;
   });
   if (coverage.empty()) return origin;

@@ -166,7 +166,7 @@ TEST_F(Library, MapsAsTheCppLibraryDoes) {
   for (std::size_t i = 0; i < values.size(); ++i)
     ASSERT_EQ(std::bit_cast<std::uint32_t>(values[i]), std::bit_cast<std::uint32_t>(cells.values[i])) << i;
   std::vector<float> half_widths = cells.errors;
-  file_.interval().half_widths(cells.values, static_cast<std::size_t>(width), half_widths, half_widths);
+  file_.interval().half_widths(cells.values, width, half_widths, half_widths);
   EXPECT_EQ(widths, half_widths);
   EXPECT_EQ(supertac_map_add(map, 0, 0, nullptr, nullptr), -1);
   EXPECT_STREQ(supertac_error(), "supertac_map_add: a pointer is NULL");
