@@ -104,7 +104,8 @@ const char* supertac_sensor_probe(supertac_sensor* sensor, const char* port, dou
     expect(sensor->reader == nullptr, "supertac_sensor_probe: it is being read");
     expect_within("supertac_sensor_probe: seconds", seconds, 0.1, 600);
     const Sensor at = at_port(*sensor, port);
-    const ProbeReport report = probe(listen(open_port(at.port), at.port, seconds), at.port, at);
+    const ProbeReport report =
+        probe(listen(open_port(at.port), at.port, seconds, [] { return false; }), at.port, at);
     nlohmann::ordered_json json = {{"says", report.says}, {"draft", nullptr}};
     if (report.draft) json["draft"] = json_of(*report.draft);
     sensor->probed = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);

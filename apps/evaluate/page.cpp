@@ -267,7 +267,7 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
                       std::back_inserter(of_groups));
   const std::vector<std::uint32_t> frames = film_frames(test);
   std::vector<std::uint32_t> chosen = frames;
-  for (const std::vector<ScoredWindow>* some : {&best, &worst, &of_groups})
+  for (const std::vector<ScoredWindow>* some : {&best, &worst, &std::as_const(of_groups)})
     for (const ScoredWindow& one : *some) chosen.push_back(one.window);
   std::sort(chosen.begin(), chosen.end());
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
