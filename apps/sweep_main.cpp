@@ -32,7 +32,7 @@ void declare(Arguments& a) {
   a.required("out", "DIR", "sweep.csv, chart.html and models; a sweep that was stopped goes on where it was")
       .writes();
   a.required("data", "DIR", "recordings to train and test on");
-  a.option("preset", "A,B,...", "recipes to start from: paper, best, tiny, frame", "paper");
+  a.option("preset", "A,B,...", "recipes to start from: paper, tiny, frame", "paper");
   a.option("timesteps", "T,...",
            "samples per window, multiples of 16, 32 to 512, or 1 (default: the preset's)");
   a.option("latent", "LD,...", "latent numbers per group of taxels (default: the preset's)");

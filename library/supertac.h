@@ -156,7 +156,7 @@ SUPERTAC_API int supertac_pairs_read(const supertac_pairs* pairs, size_t first, 
                                      float* truths);
 
 /* Trains a network on a folder of recordings and writes the model, in the place of an older file `out`, as
-   supertac-train does: the same settings make the same content. recipe: "paper", "best", "tiny" or "frame".
+   supertac-train does: the same settings make the same content. recipe: "paper", "tiny" or "frame".
    settings: NULL, or what differs from the recipe. progress: NULL, or called after every step; another result
    than 0 ends the training. 1: written, 0: ended early and nothing written, -1: failed. */
 typedef struct {

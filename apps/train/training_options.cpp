@@ -83,9 +83,9 @@ void declare_window_training(Arguments& a) {
 
 void declare_network(Arguments& a) {
   a.option("preset", "NAME",
-           "recipe to begin with: paper (as in the paper), best (what measures best for one network: plain "
-           "autoencoders by Muon), tiny (a ninth of the multiply-adds, a third of the time) or frame (single "
-           "frames as they are, without a window of time: for sensors that press or lie still)",
+           "recipe to begin with: paper (as in the paper), tiny (a ninth of the multiply-adds, a third of the "
+           "time) or frame (single frames as they are, without a window of time: for sensors that press or lie "
+           "still)",
            "paper");
   a.option(
       "like", "MODEL",
@@ -139,8 +139,6 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
                        in_quotes(a.text("interval-factor")));
   }
   if (a.flag("last-frame")) r.model.last_frame_path = true;
-  if (a.given("beta") && !r.sampling)
-    throw UsageError("--beta: has no part in the plain autoencoders of preset best; leave it out");
   if (a.given("beta")) r.loss.beta = a.number("beta", 0, 1e6);
   as_usage([&] { r.check(); });
   return r;
@@ -153,7 +151,7 @@ Recipe recipe_of(const Arguments& a) {
   if (a.given("like")) {
     r = Recipe::of(load_model(a.text("like")), a.text("like"));
   } else {
-    r = Recipe::named(a.choice("preset", {"paper", "best", "tiny", "frame"}));
+    r = Recipe::named(a.choice("preset", {"paper", "tiny", "frame"}));
   }
   if (a.given("timesteps")) r.model.timesteps = a.integer("timesteps", 1, 512);
   if (a.given("latent")) r.model.latent = a.integer("latent", 1, 256);

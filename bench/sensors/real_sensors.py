@@ -5,8 +5,8 @@
 
 For each set and three seeds a fifth of the groups is kept away. On the others preset `frame` is trained twice: with split
 `group`, which finds how wide the intervals must be on groups that a training has not seen, and on all of them. Where
-frames belong together in time a window of 32 frames (`best --last-frame`) is trained as well. All methods draw the same
-frames, those kept away. What is there is not trained again; scores go to bench/results/sensors.csv.
+frames belong together in time a window of 32 frames (`--optimizer muon --last-frame`) is trained as well. All methods
+draw the same frames, those kept away. What is there is not trained again; scores go to bench/results/sensors.csv.
 """
 import json
 import pathlib
@@ -106,7 +106,7 @@ class Study:
     def windows(self, name, seed):
         read, _, in_time = sets.SETS[name]
         if in_time:
-            yield "window", self.network(name, seed, "window", split(list(read(self.folder)), seed), 32, "--preset", "best",
+            yield "window", self.network(name, seed, "window", split(list(read(self.folder)), seed), 32, "--optimizer", "muon",
                                          "--last-frame", "--rate", RATE[name], "--scaling", "fixed", "--augment", "none")
 
 

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """The figures of bench/results/accuracy.md and unseen_plates.md, from the real recordings as text.
 
-    bench/studies/accuracy.py known  BIN TEXT_DIR OUT_DIR [SEEDS]    presets paper, best and tiny, and four of best averaged
+    bench/studies/accuracy.py known  BIN TEXT_DIR OUT_DIR [SEEDS]    presets paper and tiny, passes aligned and not
+    bench/studies/accuracy.py passes BIN TEXT_DIR OUT_DIR [SEEDS]    preset paper, by pass, pictures and maps; no pass of
+                                                                     trial 2 has helped to find a place of trial 1
     bench/studies/accuracy.py unseen BIN TEXT_DIR OUT_DIR [SEEDS]    one plate left out of trial 1, random plates beside it
 
 SEEDS: 0,1,2,3,4. About six minutes a network on one core; what is there in OUT_DIR is not made again, so a run can be
-interrupted. Writes OUT_DIR/whole_passes.csv or left_out.csv, whose lines replace those of bench/results. Choices are
-made on trial 1 (bench/README.md); this looks at trial 2.
+interrupted. Writes OUT_DIR/whole_passes.csv, passes.csv, surfaces.csv and baselines.csv, or left_out.csv, whose lines replace
+those of bench/results. Choices are made on trial 1 (bench/README.md); this looks at trial 2.
 """
 import json
 import pathlib
@@ -18,7 +20,7 @@ from source import write  # noqa: E402
 
 KNOWN = ("3_Bumps", "6_Bumps", "4_Ridges", "6_Ridges")
 PLATES = (*KNOWN, "4_Blob", "6_Blob", "4_Waves", "6_Waves")
-PRESETS = ("paper", "best", "tiny")
+PRESETS = ("paper", "tiny")
 RANDOM = ["--preset", "tiny", "--latent", "20", "--stride", "4", "--epochs", "12", "--random-plates", "1500"]
 FIGURES = {"contact_ssim": ("contact", "ssim"), "contact_psnr_db": ("contact", "psnr_mean_db"),
            "position_error_mm": ("contact", "position_error_mm"), "miss_rate": ("contact", "miss_rate"),
@@ -32,8 +34,7 @@ class Study:
         self.out.mkdir(parents=True, exist_ok=True)
         self.all = self.imported("recordings", self.text)
         self.trial1 = self.linked("trial1", {p.name: p for p in self.all.glob("*_t1_*")})  # aligned with trial 2
-        trial2 = {f"{plate}/2": self.text / plate / "2" for plate in PLATES if (self.text / plate / "2").is_dir()}
-        self.alone = self.imported("independent", self.linked("text2", trial2))
+        self.alone = self.trial_alone("independent", 2)
 
     def run(self, program, *words):
         subprocess.run([str(self.bin / program), *map(str, words)], check=True, stdout=subprocess.DEVNULL)
@@ -51,17 +52,25 @@ class Study:
                 path.symlink_to(target)
         return self.out / name
 
+    def trial_alone(self, name, trial):
+        texts = {f"{plate}/{trial}": self.text / plate / str(trial) for plate in PLATES}
+        texts = {link: target for link, target in texts.items() if target.is_dir()}
+        return self.imported(name, self.linked(f"text{trial}", texts))
+
     def train(self, name, data, *options):
         path = self.out / f"{name}.safetensors"
         if not path.exists():
             self.run("supertac-train", "--data", data, "--out", path, "--threads", 1, "--force", *options)
         return path
 
-    def scores(self, name, models, data, *options):
+    def evaluated(self, name, models, data, *options):
         path = self.out / f"{name}.json"
         if not path.exists():
             self.run("supertac-evaluate", "--model", ",".join(map(str, models)), "--data", data, "--json", path, *options)
-        found = json.loads(path.read_text())
+        return json.loads(path.read_text())
+
+    def scores(self, name, models, data, *options):
+        found = self.evaluated(name, models, data, *options)
         return {figure: f"{found[part][key]:.4f}" if found.get(part, {}).get(key) is not None else ""
                 for figure, (part, key) in FIGURES.items()}
 
@@ -74,15 +83,57 @@ def known(study):
             found = study.scores(f"{network.replace(' ', '_')}_s{seed}_{how}", models, data, *plates, *split)
             lines.append({"network": network, "registered": how, "seed": seed, **found})
 
-    models = {}
     for preset in PRESETS:
         for seed in study.seeds:
             options = ["--preset", preset, "--split", "trial", "--seed", seed, *plates]
-            models[preset, seed] = study.train(f"{preset}_s{seed}", study.all, *options)
-            score(preset, seed, [models[preset, seed]])
-    for left_out in study.seeds if len(study.seeds) > 1 else ():
-        score("four of best averaged", left_out, [models["best", seed] for seed in study.seeds if seed != left_out])
+            score(preset, seed, [study.train(f"{preset}_s{seed}", study.all, *options)])
     write(study.out / "whole_passes.csv", lines)
+
+
+def by_pass(found):
+    """What an evaluation says of each pass: of the pictures, and as read back from the two maps."""
+    of = {"": found, "map_": found["map"]["of_pass"], "plate_map_": found["map"]["of_surface"]}
+    parts = {prefix: part["over_passes"]["passes"] for prefix, part in of.items()}
+    for number, one in enumerate(parts[""]):
+        yield {key: one[key] for key in ("plate", "trial", "pass", "windows")} | {
+            prefix + name: f"{part[number][key]:.4f}" for prefix, part in parts.items()
+            for key, name in (("ssim", "ssim"), ("psnr_mean_db", "psnr_db"))}
+
+
+def of_surface(found):
+    """And of one plate."""
+    line = {"windows": found["contact"]["windows"], "position_error_mm": f"{found['contact']['position_error_mm']:.4f}"}
+    for prefix, part in (("", found), ("map_", found["map"]["of_pass"])):
+        first = [one for one in part["felt"] if one["from_mm"] < 15]
+        line["first_15_mm_windows"] = sum(one["windows"] for one in first)
+        line[prefix + "first_15_mm_ssim"] = f"{sum(one['ssim'] * one['windows'] for one in first) / line['first_15_mm_windows']:.4f}"
+    for truth, held in found["trust"]["coverage_of"].items():
+        line |= {f"{truth}, pixels": f"{held['pixels']:.0f}", f"{truth}, held": f"{held['share']:.4f}",
+                 f"{truth}, half width": f"{held['half_width']:.4f}"}
+    for prefix, maps in (("", "of_pass"), ("plate_", "of_surface")):
+        line |= {f"{prefix}elements_{key}": value for key, value in found["map"][maps]["elements"].items()}
+    return line
+
+
+def passes(study):
+    first = study.trial_alone("trial1_alone", 1)
+    both = study.linked("apart", {p.name: p for folder in (first, study.alone) for p in folder.glob("*.safetensors")})
+    plates, models, lines, surfaces = ["--plates", ",".join(KNOWN)], {}, [], []
+    for seed in study.seeds:
+        models[seed] = study.train(f"apart_s{seed}", both, "--split", "trial", "--seed", seed, *plates)
+        found = study.evaluated(f"apart_s{seed}_passes", [models[seed]], both)
+        baselines = [{"method": method, "ssim": one["contact"]["ssim"], "psnr_db": one["contact"]["psnr_mean_db"]}
+                     for method, one in found["baselines"].items()]
+        lines += [{"network": "paper", "seed": seed, **one} for one in by_pass(found)]
+        for plate in KNOWN:
+            found = study.evaluated(f"apart_s{seed}_{plate}", [models[seed]], both, "--plates", plate)
+            surfaces.append({"network": "paper", "seed": seed, "plate": plate, **of_surface(found)})
+    for seed in study.seeds if len(study.seeds) > 1 else ():
+        found = study.evaluated(f"apart_without_s{seed}_passes", [m for s, m in models.items() if s != seed], both)
+        lines += [{"network": "all but this one, averaged", "seed": seed, **one} for one in by_pass(found)]
+    write(study.out / "passes.csv", lines)
+    write(study.out / "surfaces.csv", surfaces)
+    write(study.out / "baselines.csv", baselines)
 
 
 def unseen(study):
@@ -104,6 +155,7 @@ def unseen(study):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) not in (5, 6) or sys.argv[1] not in ("known", "unseen"):
+    studies = {"known": known, "passes": passes, "unseen": unseen}
+    if len(sys.argv) not in (5, 6) or sys.argv[1] not in studies:
         sys.exit(__doc__)
-    {"known": known, "unseen": unseen}[sys.argv[1]](Study(*sys.argv[2:]))
+    studies[sys.argv[1]](Study(*sys.argv[2:]))

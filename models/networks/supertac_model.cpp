@@ -102,11 +102,11 @@ void SuperTacSettings::check() const {
 }
 
 SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
-  if (name == "paper" || name == "best") return {.preset = name, .predicted_error = true};
+  if (name == "paper") return {.preset = name, .predicted_error = true};
   if (name == "tiny")
     return {.preset = "tiny", .timesteps = 128, .channels = 8, .rcabs = 1, .predicted_error = true};
   if (name == "frame") return {.preset = name, .timesteps = 1, .predicted_error = true};
-  throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, best, tiny, frame");
+  throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, tiny, frame");
 }
 
 Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)

@@ -73,10 +73,7 @@ Recipe Recipe::named(const std::string& name) {
   }
   r.rate_hz = static_cast<double>(r.model.timesteps) / kWindowS;
   r.augment = kStandardAugmentation;
-  if (name == "best") {
-    r.sampling = false, r.loss.beta = 0;
-    r.muon = true;
-  } else if (name == "tiny") {
+  if (name == "tiny") {
     r.epochs = 80;
     r.learning_rate = 2e-3;
   }

@@ -196,7 +196,7 @@ def train(recipe: str, folder: Path, out: Path,
           callback: Callable[[int, float], object] | None = None, *, epochs: int = 0, stride: int = 0, seed: int = 0,
           split: str | None = None) -> bool:
     """Trains as supertac-train does, to the same content, on a folder of recordings, and replaces `out`. recipe:
-    "paper", "best", "tiny" or "frame".
+    "paper", "tiny" or "frame".
 
     callback(step, loss) is called after every step; when it returns something true, training ends early, and False is
     returned and nothing written. epochs and stride: 0 for the recipe's. split: what is kept for testing, "trial" or

@@ -164,14 +164,13 @@ TEST_F(Training, TheExampleEndsWithTheProgramsHash) {
 
 TEST_F(Training, LikeRepeatsATrainingToTheSameContent) {
   trained("first.safetensors",
-          "--preset best --seed 7 --split pass --stride 128 --epochs 1 --random-plates 2 --interval-factor "
+          "--optimizer muon --seed 7 --split pass --stride 128 --epochs 1 --random-plates 2 --interval-factor "
           "1.5");
   const std::string like = "supertac-train --data data --like first.safetensors --out ";
   succeed(like + "again.safetensors");
   EXPECT_EQ(content_hash(SafetensorsFile::read(path("first.safetensors"))),
             content_hash(SafetensorsFile::read(path("again.safetensors"))));
   const SafetensorsFile file = SafetensorsFile::read(path("again.safetensors"));
-  EXPECT_TRUE(contains(file.metadata().at("settings"), "\"preset\":\"best\""));
   EXPECT_TRUE(contains(file.metadata().at("training"), "\"optimizer\":\"muon\""));
   succeed(like + "other.safetensors --seed 8");
   EXPECT_NE(content_hash(SafetensorsFile::read(path("first.safetensors"))),
@@ -262,7 +261,6 @@ TEST_F(Training, BadInputIsOneLineAndLeavesNothingBehind) {
            {train + "--plates 6_Bumps", 1, "6_Bumps"},
            {train + "--leave-out 3_Bumps", 2, "--split texture"},
            {train + "--resume good.safetensors", 1, "cannot resume"},
-           {train + "--preset best --beta 1", 2, "--beta: has no part in the plain autoencoders"},
            {evaluate + "damaged.safetensors", 1, "damaged.safetensors"},
            {evaluate + "cut.safetensors", 1, "cut.safetensors"},
            {evaluate + "absent", 1, "absent"},

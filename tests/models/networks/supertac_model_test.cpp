@@ -152,7 +152,7 @@ TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
   EXPECT_EQ(what_of<std::invalid_argument>([&] { grouping_of("diagonal"); }),
             "grouping must be horizontal or vertical, got \"diagonal\"");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { SuperTacSettings::of_preset("huge"); }),
-            "unknown preset \"huge\"; known: paper, best, tiny, frame");
+            "unknown preset \"huge\"; known: paper, tiny, frame");
 }
 
 }  // namespace
