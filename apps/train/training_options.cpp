@@ -82,11 +82,12 @@ void declare_window_training(Arguments& a) {
 }
 
 void declare_network(Arguments& a) {
-  a.option("preset", "NAME",
-           "recipe to begin with: paper (as in the paper), tiny (a ninth of the multiply-adds, a third of the "
-           "time) or frame (single frames as they are, without a window of time: for sensors that press or lie "
-           "still)",
-           "paper");
+  a.option(
+      "preset", "NAME",
+      "recipe to begin with: paper (as in the paper), tiny (a ninth of the multiply-adds, a third of the "
+      "time) or frame (single frames as they are, without a window of time: for sensors that press or lie "
+      "still)",
+      "paper");
   a.option(
       "like", "MODEL",
       "begin with the recipe of this model instead: with the same recordings and no other option the same "

@@ -52,8 +52,8 @@ struct SuperTacSettings {
   /// Throws std::invalid_argument naming the setting, its range and what was given.
   void check() const;
   /// The network of a named recipe (models/training/recipe.h): "paper"; "tiny" has a ninth of its
-  /// multiply-adds, "frame" its upsampler alone. Throws std::invalid_argument for an unknown name, listing the
-  /// known ones.
+  /// multiply-adds, "frame" its upsampler alone. Throws std::invalid_argument for an unknown name, listing
+  /// the known ones.
   static SuperTacSettings of_preset(const std::string& name);
 };
 

@@ -21,8 +21,8 @@ struct ModelFile;
 struct Recipe : TrainingPace {
   SuperTacSettings model;  ///< rows, columns and in_channels become those of the recordings
   LossWeights loss;
-  /// Whether z is drawn around its mean. Without, and with beta 0, the VAEs are plain autoencoders: older files
-  /// have it (preset "best").
+  /// Whether z is drawn around its mean. Without, and with beta 0, the VAEs are plain autoencoders: older
+  /// files have it (preset "best").
   bool sampling = true;
   /// Of the windows. With any of it, passes in which nothing is felt are added (add_silent_passes).
   AugmentSettings augment;
@@ -49,8 +49,9 @@ struct Recipe : TrainingPace {
   void check() const;
 
   /// `paper`: as in the paper, at 100 Hz. `tiny`: a ninth of the multiply-adds, at 50 Hz. Epochs and learning
-  /// rate are those that measured best on the rig's recordings (bench/results). `frame`: single frames as they
-  /// are, of sensors that press or lie still. Throws std::invalid_argument for another name, listing these.
+  /// rate are those that measured best on the rig's recordings (bench/results). `frame`: single frames as
+  /// they are, of sensors that press or lie still. Throws std::invalid_argument for another name, listing
+  /// these.
   static Recipe named(const std::string& name);
   /// What `file` (read from `path`) was trained with, its signal range included: the same recordings give the
   /// same file again. Throws std::runtime_error naming path and entry when the file does not say it.

@@ -163,9 +163,10 @@ TEST_F(Training, TheExampleEndsWithTheProgramsHash) {
 }
 
 TEST_F(Training, LikeRepeatsATrainingToTheSameContent) {
-  trained("first.safetensors",
-          "--optimizer muon --seed 7 --split pass --stride 128 --epochs 1 --random-plates 2 --interval-factor "
-          "1.5");
+  trained(
+      "first.safetensors",
+      "--optimizer muon --seed 7 --split pass --stride 128 --epochs 1 --random-plates 2 --interval-factor "
+      "1.5");
   const std::string like = "supertac-train --data data --like first.safetensors --out ";
   succeed(like + "again.safetensors");
   EXPECT_EQ(content_hash(SafetensorsFile::read(path("first.safetensors"))),
@@ -247,24 +248,24 @@ TEST_F(Training, BadInputIsOneLineAndLeavesNothingBehind) {
   };
   const std::string train = "supertac-train --data data --out never.safetensors ",
                     evaluate = "supertac-evaluate --data data --model ";
-  for (const auto& [line, code, message] : std::vector<Bad>{
-           {train + "--timesteps 40", 2, "multiple of 16"},
-           {train + "--timesteps 1024", 2, "--timesteps"},
-           {train + "--scale 3", 2, "--scale"},
-           {train + "--preset huge", 2, "--preset"},
-           {train + "--epoch 3", 2, "--epochs"},
-           {train + "--split texture", 1, "texture"},
-           {train + "--data " + path("empty"), 1, path("empty")},
-           {train + "--data " + path("absent"), 1, path("absent")},
-           {train + "--out good.safetensors", 1, "--force"},
-           {train + "--out " + path("absent/x.safetensors"), 1, path("absent")},
-           {train + "--plates 6_Bumps", 1, "6_Bumps"},
-           {train + "--leave-out 3_Bumps", 2, "--split texture"},
-           {train + "--resume good.safetensors", 1, "cannot resume"},
-           {evaluate + "damaged.safetensors", 1, "damaged.safetensors"},
-           {evaluate + "cut.safetensors", 1, "cut.safetensors"},
-           {evaluate + "absent", 1, "absent"},
-           {"supertac-evaluate --model good.safetensors", 2, "--data"}}) {
+  for (const auto& [line, code, message] :
+       std::vector<Bad>{{train + "--timesteps 40", 2, "multiple of 16"},
+                        {train + "--timesteps 1024", 2, "--timesteps"},
+                        {train + "--scale 3", 2, "--scale"},
+                        {train + "--preset huge", 2, "--preset"},
+                        {train + "--epoch 3", 2, "--epochs"},
+                        {train + "--split texture", 1, "texture"},
+                        {train + "--data " + path("empty"), 1, path("empty")},
+                        {train + "--data " + path("absent"), 1, path("absent")},
+                        {train + "--out good.safetensors", 1, "--force"},
+                        {train + "--out " + path("absent/x.safetensors"), 1, path("absent")},
+                        {train + "--plates 6_Bumps", 1, "6_Bumps"},
+                        {train + "--leave-out 3_Bumps", 2, "--split texture"},
+                        {train + "--resume good.safetensors", 1, "cannot resume"},
+                        {evaluate + "damaged.safetensors", 1, "damaged.safetensors"},
+                        {evaluate + "cut.safetensors", 1, "cut.safetensors"},
+                        {evaluate + "absent", 1, "absent"},
+                        {"supertac-evaluate --model good.safetensors", 2, "--data"}}) {
     SCOPED_TRACE(line);
     expect_failure(run(line), code, message);
   }
