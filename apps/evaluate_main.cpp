@@ -46,11 +46,12 @@ std::string row(const std::string& name, const ZoneMetrics& metrics, const Laten
 
 /// The scores of the network and of every baseline over the same windows.
 struct RecordingScores {
-  RecordingScores(const WindowSet& windows, const ModelFile& model, std::size_t methods)
+  RecordingScores(const WindowSet& windows, const ModelFile& model, const std::optional<Plate>& kind,
+                  std::size_t methods)
       : by_distance(windows),
         by_group(windows),
         trust(windows, model),
-        map(windows, model),
+        map(windows, model, kind),
         by_pass(windows) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
@@ -64,8 +65,8 @@ struct RecordingScores {
 
 RecordingScores score_all(const Arguments& a, const Ensemble& network, const ModelFile& file,
                           const WindowSet& windows, const TestSet& tested, const Baselines& baselines,
-                          OutputsFile* outputs, EvaluationPage* page) {
-  RecordingScores scores(windows, file, 1 + baselines.size());
+                          const std::optional<Plate>& kind, OutputsFile* outputs, EvaluationPage* page) {
+  RecordingScores scores(windows, file, kind, 1 + baselines.size());
   draw_all(a, network, windows, tested.split.test, baselines, [&](const Drawn& d) {
     const Zone zone = windows.zone(d.example);
     for (std::size_t m = 0; m < d.pictures.size(); ++m)
@@ -190,6 +191,10 @@ void declare(Arguments& a) {
        "write the surfaces that were felt, of each plate and trial: .png; .safetensors, with those of each "
        "pass beside them; or of one plate and trial .stl (docs/map.md)")
       .writes();
+  a.option(
+      "elements", "KIND",
+      "where a map shows an element, draw one of this kind: bumps, ridges, blobs, or an STL file of a plate "
+      "with one element in its middle; maps are scored so too");
   a.option("plates", "A,B,...", "only recordings of these plates (default: the model's own)");
   a.option("pictures", "DIR",
            "write PNG pictures: input | output | truth | how far off it may be, and a film of each test pass")
@@ -201,6 +206,9 @@ void declare(Arguments& a) {
 
 int run(Arguments& a) {
   if (a.given("map")) read_option("map", [&] { return check_map_path(a.text("map")), 0; });
+  std::optional<Plate> kind;
+  if (a.given("elements"))
+    kind = read_option("elements", [&] { return kind_of_elements(a.text("elements")); });
   const std::vector<ModelFile> files = load_models(a.list("model"));
   const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
   TestSet tested = test_set_of(a, files.front());
@@ -224,12 +232,16 @@ int run(Arguments& a) {
       fit_baselines(windows, tested.split.train, progress_of(a, "fitting the baselines", "parts"));
   EvaluationPage page(windows);
   const RecordingScores scores =
-      score_all(a, network, files.front(), windows, tested, baselines,
+      score_all(a, network, files.front(), windows, tested, baselines, kind,
                 a.given("outputs") ? &outputs : nullptr, a.given("report") ? &page : nullptr);
   const nlohmann::ordered_json result = report(a, network, windows, tested, baselines, scores);
   if (pictures) write_pictures(network, files.front().interval(), windows, tested.split.test, *pictures);
   if (a.given("outputs")) outputs.write(a.output("outputs"));
-  if (a.given("map")) write_maps(a.output("map"), scores.map.maps(a.text("map").ends_with(".safetensors")));
+  if (a.given("map")) {
+    std::vector<NamedMap> maps = scores.map.maps(a.text("map").ends_with(".safetensors"));
+    if (kind) std::ranges::for_each(maps, [&](NamedMap& map) { draw_as(map, *kind); });
+    write_maps(a.output("map"), maps);
+  }
   if (a.given("report"))
     write_file(a.output("report"), page.html(network, tested.split.test, result, made_by(a, windows)));
   if (pictures) pictures->keep();

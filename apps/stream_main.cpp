@@ -36,6 +36,7 @@ std::string source_of(const Arguments& a) {
   if (a.given("plate") && !a.given("record")) throw UsageError("--plate: only with --record");
   if (!is_unknown_plate(a.text("plate"))) read_option("plate", [&] { return Plate::named(a.text("plate")); });
   if (a.given("map")) read_option("map", [&] { return check_map_path(a.text("map")), 0; });
+  if (a.given("elements") && !a.given("map")) throw UsageError("--elements: only with --map");
   if (a.given("capture") && !a.given("board")) throw UsageError("--capture: only with --board");
   return source;
 }
@@ -85,6 +86,10 @@ void declare(Arguments& a) {
           "keep the surface that was felt, as far as the finger's places are known: .png, .safetensors or "
           ".stl (docs/map.md)")
       .writes()
+      .option(
+          "elements", "KIND",
+          "where the map shows an element, draw one of this kind: bumps, ridges, blobs, or an STL file of a "
+          "plate with one element in its middle")
       .option("record", "DIR", "keep the signals as a recording in this folder, the next pass of its plate")
       .option("plate", "NAME", "what the recording slides over: a plate's name, or an STL file", "unknown")
       .option("udp", "HOST:PORT",
@@ -193,6 +198,8 @@ int run(Arguments& a) {
   if (probed) settings.found = probed->says;
   if (a.given("seconds") && !probed) settings.seconds = a.number("seconds", 0.001, 1e9);
   const std::string origin = source_of(a);
+  if (a.given("elements"))
+    settings.elements = read_option("elements", [&] { return kind_of_elements(a.text("elements")); });
   settings.web = web_address(a);
   settings.badge = badge_of(a), settings.source = origin;
   const bool drawn = a.given("model");

@@ -137,6 +137,19 @@ def maps():
     return table(["plate", *columns.values(), "first 15 mm: picture", "map"], lines)
 
 
+def shown_elements():
+    found, lines = rows("accuracy/elements.csv"), []
+    for network, trial in (("paper", "2"), ("without the plate", "1"), ("without the plate", "2")):
+        for plate in [*dict.fromkeys(r["plate"] for r in found), "all"]:
+            of = [r for r in chosen(found, network=network, trial=trial, map_of="plate") if plate in ("all", r["plate"])]
+            total = {key: sum(int(r[key]) for r in of) for key in ("existing", "found", "false")}
+            known = "five networks" if network == "paper" else "left out"
+            lines.append([plate, known, trial, f"{total['found']} of {total['existing']}", str(total["false"]),
+                          *(f"{mean(of, c):.2f}" for c in ("median_mm", "pitch_error_mm")),
+                          *(f"{mean(of, c):.3f}" for c in ("ssim", "stated_ssim"))])
+    return table(["plate", "network", "trial", "found", "false", "off by mm", "pitch off by mm", "SSIM", "SSIM, kind stated"], lines)
+
+
 def first_contact():
     found = rows("accuracy/first_contact.csv")
     return table(["mm since the first contact"] + [r["felt_mm"] for r in found],

@@ -3,12 +3,13 @@
 #include <cmath>
 
 #include "data/plates/truth.h"
+#include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
 
-MapScores::MapScores(const WindowSet& windows, const ModelFile& model)
-    : windows_(windows), model_(model), by_pass_(windows), by_surface_(windows) {}
+MapScores::MapScores(const WindowSet& windows, const ModelFile& model, std::optional<Plate> kind)
+    : windows_(windows), model_(model), kind_(std::move(kind)), by_pass_(windows), by_surface_(windows) {}
 
 std::string MapScores::surface_of(std::size_t pass) const {
   const WindowSet::Pass& p = windows_.passes()[pass];
@@ -28,12 +29,18 @@ void MapScores::add(const Drawn& drawn) {
 
 void MapScores::finish() {
   std::vector<float> read(windows_.image().pixels()), truth(read.size());
+  std::map<const SurfaceMap*, Plate> drawn;  // where the kind of the elements is stated
+  const auto state = [&](const SurfaceMap& map, std::size_t pass) {
+    if (kind_) drawn.emplace(&map, plate_of(elements(named("", map, pass)), *kind_));
+  };
+  for (const auto& [pass, map] : of_pass_) state(map, pass);
+  for (const auto& [name, map] : of_surface_) state(map.first, map.second);
   for (const std::uint32_t window : added_) {
     const std::size_t pass = windows_.pass_of(window);
     const auto [x, y] = windows_.position(window);
     windows_.truth(window, truth);
     const auto score = [&](const SurfaceMap& map, Scored& scored) {
-      map.read(x, y, read);
+      kind_ ? truth_image(drawn.at(&map), x, y, windows_.image(), read) : map.read(x, y, read);
       scored.zones.add(read, truth, windows_.zone(window));
       if (const auto one = contact_score(windows_, window, read, truth))
         scored.by_distance.add(*one), scored.by_pass.add(*one);
@@ -58,7 +65,8 @@ std::vector<std::string> MapScores::lines() const {
     return std::to_string(e.found) + " of " + std::to_string(e.existing) + ", " + std::to_string(e.invented) +
            " false";
   };
-  std::vector<std::string> lines = {"in contact, read back from the map of the pass: " + text(by_pass_) +
+  std::vector<std::string> lines = {std::string("in contact, read back from the map of the pass") +
+                                    (kind_ ? ", elements drawn as stated: " : ": ") + text(by_pass_) +
                                     "; from that of all passes: " + text(by_surface_)};
   if (by_surface_.elements.existing > 0)
     lines.push_back("elements found within " + format(ElementScores::kFoundMm) +
@@ -69,6 +77,9 @@ std::vector<std::string> MapScores::lines() const {
 
 nlohmann::ordered_json MapScores::to_json() const {
   const auto number = [](double v) { return std::isfinite(v) ? nlohmann::ordered_json(v) : nullptr; };
+  const auto middle = [](std::vector<double> v) {
+    return v.empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(median(std::move(v)));
+  };
   nlohmann::ordered_json json;
   for (const auto& [name, scored] :
        {std::pair("of_pass", &by_pass_), std::pair("of_surface", &by_surface_)}) {
@@ -81,7 +92,21 @@ nlohmann::ordered_json MapScores::to_json() const {
                    {{"existing", scored->elements.existing},
                     {"found", scored->elements.found},
                     {"false", scored->elements.invented},
-                    {"median_mm", number(scored->elements.median_mm())}}}};
+                    {"median_mm", middle(scored->elements.distances_mm)},
+                    {"pitch_error_mm", middle(scored->elements.pitch_errors_mm)}}}};
+  }
+  for (const NamedMap& map : maps(false)) {
+    const std::vector<Element> found = elements(map);
+    auto& rows = json["surfaces"][map.name] = {{"pitch_mm", number(pitch_mm(found))}};
+    for (const Element& e : found)
+      rows["elements"].push_back({{"x_mm", e.x_mm},
+                                  {"y_mm", e.y_mm},
+                                  {"x_off_mm", e.x_off_mm},
+                                  {"y_off_mm", e.y_off_mm},
+                                  {"height", e.height},
+                                  {"height_off", e.height_off},
+                                  {"length_mm", e.length_mm},
+                                  {"width_mm", e.width_mm}});
   }
   return json;
 }
@@ -91,12 +116,10 @@ NamedMap MapScores::named(const std::string& name, const SurfaceMap& map, std::s
   model_.interval().half_widths(named.cells.values, named.cells.region.width, named.cells.errors,
                                 named.cells.errors);
   if (windows_.truth_is_measured(pass)) return named;
-  const MapRegion& r = named.cells.region;
-  for (std::int64_t j = 0; j < r.height; ++j)
-    for (std::int64_t i = 0; i < r.width; ++i)
-      named.truth.push_back(static_cast<float>(
-          truth_value(windows_.plate(pass), (static_cast<double>(r.left + i) + 0.5) * named.cell_mm.x,
-                      (static_cast<double>(r.bottom + j) + 0.5) * named.cell_mm.y)));
+  for (std::size_t c = 0; c < named.cells.values.size(); ++c) {
+    const auto [x, y] = centre_of(named, c);
+    named.truth.push_back(static_cast<float>(truth_value(windows_.plate(pass), x, y)));
+  }
   return named;
 }
 

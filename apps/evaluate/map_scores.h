@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,8 +22,10 @@ namespace supertac {
 /// known belong to no map.
 class MapScores {
  public:
-  /// `model`: whose intervals the maps have; both must outlive this.
-  MapScores(const WindowSet& windows, const ModelFile& model);
+  /// `model`: whose intervals the maps have; both must outlive this. `kind`: of the elements, where it is
+  /// known (data/map/elements.h): pictures are then read back from what the maps are with elements of that
+  /// kind.
+  MapScores(const WindowSet& windows, const ModelFile& model, std::optional<Plate> kind);
   /// Windows of a pass come in the order of time.
   void add(const Drawn& drawn);
   /// When all have come: reads them back. Before the rest below.
@@ -32,9 +35,10 @@ class MapScores {
   /// For people: nothing when empty().
   std::vector<std::string> lines() const;
   /// {"of_pass": {"ssim", "psnr_mean_db", "felt": as DistanceScores, "over_passes": as
-  /// PassScores, "elements": {"existing", "found", "false", "median_mm"}}, "of_surface": the same}
+  /// PassScores, "elements": {"existing", "found", "false", "median_mm", "pitch_error_mm"}},
+  /// "of_surface": the same, "surfaces": {PLATE_tTRIAL: {"pitch_mm", "elements": [{"x_mm", "y_mm", ...}]}}}
   nlohmann::ordered_json to_json() const;
-  /// PLATE_tTRIAL; with passes PLATE_tTRIAL_pPASS behind them.
+  /// As the network has them. PLATE_tTRIAL; with passes PLATE_tTRIAL_pPASS behind them.
   std::vector<NamedMap> maps(bool passes) const;
 
  private:
@@ -51,6 +55,7 @@ class MapScores {
 
   const WindowSet& windows_;
   const ModelFile& model_;
+  std::optional<Plate> kind_;
   std::map<std::size_t, SurfaceMap> of_pass_;
   std::map<std::string, std::pair<SurfaceMap, std::size_t>> of_surface_;  // and one of its passes
   std::vector<std::uint32_t> added_;

@@ -100,6 +100,21 @@ std::string by_height(const nlohmann::ordered_json& trust) {
                       page_table({"pixels", "number", "within %", "half width"}, rows));
 }
 
+std::string by_element(const nlohmann::ordered_json& result) {
+  std::string rows;
+  if (!result.contains("map")) return rows;
+  for (const auto& [name, surface] : result["map"]["surfaces"].items())
+    for (const auto& e : surface.value("elements", nlohmann::ordered_json::array()))
+      rows += "<tr><td>" + escaped(name) + "</td>" + cell_of(e["x_mm"], 2) + cell_of(e["y_mm"], 2) +
+              cell_of(e["y_off_mm"], 2) + cell_of(e["height"], 2) + cell_of(e["height_off"], 2) +
+              cell_of(e["length_mm"], 1) + cell_of(e["width_mm"], 1) + cell_of(surface["pitch_mm"], 2) +
+              "</tr>";
+  return page_section(
+      "Elements", "what the map of all passes of a plate and trial shows; within how much it may be off",
+      page_table({"map", "x mm", "y mm", "within", "height", "within", "length mm", "width mm", "pitch mm"},
+                 rows));
+}
+
 std::string by_distance(const nlohmann::ordered_json& parts) {
   if (parts.empty()) return "";  // nothing slid
   ChartSeries series{.name = "network", .points = {}, .dots = true};
@@ -280,7 +295,7 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
                         std::to_string(result["all"]["windows"].get<long>()) + " windows, " +
                         std::to_string(result["contact"]["windows"].get<long>()) + " in contact</p>";
   content += by_method(result) + "<div class=\"two\">" + by_group(result["groups"]) + by_zone(result) +
-             "</div>" + by_height(result["trust"]) + by_distance(result["felt"]) +
+             "</div>" + by_height(result["trust"]) + by_distance(result["felt"]) + by_element(result) +
              (of_groups.empty() ? ""
                                 : shown("The worst of each", "the groups in the order of their scores",
                                         of_groups, pictures)) +

@@ -158,7 +158,9 @@ void Stream::write_map() const {
         settings_.map.path +
         ": no map, since no picture's place is known; expected --model and a --recording "
         "with positions, which supertac-collect and supertac-import give");
-  write_maps(settings_.map, {named_map()});
+  NamedMap map = named_map();
+  if (settings_.elements) draw_as(map, *settings_.elements);
+  write_maps(settings_.map, {map});
 }
 
 NamedMap Stream::named_map() const {

@@ -31,6 +31,7 @@ struct StreamSettings {
   std::string record = {};              ///< folder that gets a recording; empty: none
   std::string plate = "unknown";        ///< of the recording: a plate's name or an STL file
   OutputPath map = "";                  ///< file of the surface that was felt; empty: none
+  std::optional<Plate> elements = {};   ///< the kind that the map's elements are drawn as, where it is known
   std::string udp = {};                 ///< HOST:PORT that gets a line for each; empty: none
   bool view = false;                    ///< draw on the terminal
   std::optional<WebAddress> web = {};   ///< serve the live page

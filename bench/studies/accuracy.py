@@ -4,11 +4,14 @@
     bench/studies/accuracy.py known  BIN TEXT_DIR OUT_DIR [SEEDS]    presets paper and tiny, passes aligned and not
     bench/studies/accuracy.py passes BIN TEXT_DIR OUT_DIR [SEEDS]    preset paper, by pass, pictures and maps; no pass of
                                                                      trial 2 has helped to find a place of trial 1
+    bench/studies/accuracy.py elements BIN TEXT_DIR OUT_DIR [SEEDS]  what maps show of known plates (trial 2), and of each of
+                                                                     them when it was left out of the training; with its
+                                                                     kind stated and without
     bench/studies/accuracy.py unseen BIN TEXT_DIR OUT_DIR [SEEDS]    one plate left out of trial 1, random plates beside it
 
 SEEDS: 0,1,2,3,4. About six minutes a network on one core; what is there in OUT_DIR is not made again, so a run can be
-interrupted. Writes OUT_DIR/whole_passes.csv, passes.csv, surfaces.csv and baselines.csv, or left_out.csv, whose lines replace
-those of bench/results. Choices are made on trial 1 (bench/README.md); this looks at trial 2.
+interrupted. Writes OUT_DIR/whole_passes.csv, passes.csv, surfaces.csv and baselines.csv, elements.csv, or left_out.csv, whose
+lines replace those of bench/results. Choices are made on trial 1 (bench/README.md); this looks at trial 2.
 """
 import json
 import pathlib
@@ -34,7 +37,7 @@ class Study:
         self.out.mkdir(parents=True, exist_ok=True)
         self.all = self.imported("recordings", self.text)
         self.trial1 = self.linked("trial1", {p.name: p for p in self.all.glob("*_t1_*")})  # aligned with trial 2
-        self.alone = self.trial_alone("independent", 2)
+        self.first, self.alone = self.trial_alone("trial1_alone", 1), self.trial_alone("independent", 2)
 
     def run(self, program, *words):
         subprocess.run([str(self.bin / program), *map(str, words)], check=True, stdout=subprocess.DEVNULL)
@@ -62,6 +65,13 @@ class Study:
         if not path.exists():
             self.run("supertac-train", "--data", data, "--out", path, "--threads", 1, "--force", *options)
         return path
+
+    def apart(self):
+        """Trial 1 and trial 2, each registered without the other."""
+        return self.linked("apart", {p.name: p for of in (self.first, self.alone) for p in of.glob("*.safetensors")})
+
+    def trained_apart(self, name, plates, seed):
+        return self.train(name, self.apart(), "--split", "trial", "--seed", seed, "--plates", ",".join(plates))
 
     def evaluated(self, name, models, data, *options):
         path = self.out / f"{name}.json"
@@ -110,17 +120,13 @@ def of_surface(found):
     for truth, held in found["trust"]["coverage_of"].items():
         line |= {f"{truth}, pixels": f"{held['pixels']:.0f}", f"{truth}, held": f"{held['share']:.4f}",
                  f"{truth}, half width": f"{held['half_width']:.4f}"}
-    for prefix, maps in (("", "of_pass"), ("plate_", "of_surface")):
-        line |= {f"{prefix}elements_{key}": value for key, value in found["map"][maps]["elements"].items()}
     return line
 
 
 def passes(study):
-    first = study.trial_alone("trial1_alone", 1)
-    both = study.linked("apart", {p.name: p for folder in (first, study.alone) for p in folder.glob("*.safetensors")})
-    plates, models, lines, surfaces = ["--plates", ",".join(KNOWN)], {}, [], []
+    models, lines, surfaces, both = {}, [], [], study.apart()
     for seed in study.seeds:
-        models[seed] = study.train(f"apart_s{seed}", both, "--split", "trial", "--seed", seed, *plates)
+        models[seed] = study.trained_apart(f"apart_s{seed}", KNOWN, seed)
         found = study.evaluated(f"apart_s{seed}_passes", [models[seed]], both)
         baselines = [{"method": method, "ssim": one["contact"]["ssim"], "psnr_db": one["contact"]["psnr_mean_db"]}
                      for method, one in found["baselines"].items()]
@@ -134,6 +140,28 @@ def passes(study):
     write(study.out / "passes.csv", lines)
     write(study.out / "surfaces.csv", surfaces)
     write(study.out / "baselines.csv", baselines)
+
+
+def elements(study):
+    lines = []
+
+    def score(network, seed, model, plate, trial):
+        data, kind = (study.first, study.alone)[trial - 1], plate.split("_")[1].lower()
+        name = f"elements_{network.replace(' ', '_')}_s{seed}_{plate}_t{trial}"
+        found, drawn = (study.evaluated(name + also[-1], [model], data, "--split", "none", "--plates", plate, *also[:-1])
+                        for also in (["_found"], ["--elements", kind, "_stated"]))
+        for maps, of in (("pass", "of_pass"), ("plate", "of_surface")):
+            lines.append({"network": network, "seed": seed, "plate": plate, "trial": trial, "map_of": maps,
+                          "ssim": found["map"][of]["ssim"], "stated_ssim": drawn["map"][of]["ssim"],
+                          **found["map"][of]["elements"]})
+
+    for plate in KNOWN:
+        for seed in study.seeds:
+            score("paper", seed, study.trained_apart(f"apart_s{seed}", KNOWN, seed), plate, 2)
+        model = study.trained_apart(f"apart_without_{plate}", [p for p in KNOWN if p != plate], 0)
+        for trial in (1, 2):
+            score("without the plate", 0, model, plate, trial)
+    write(study.out / "elements.csv", lines)
 
 
 def unseen(study):
@@ -155,7 +183,7 @@ def unseen(study):
 
 
 if __name__ == "__main__":
-    studies = {"known": known, "passes": passes, "unseen": unseen}
+    studies = {"known": known, "passes": passes, "elements": elements, "unseen": unseen}
     if len(sys.argv) not in (5, 6) or sys.argv[1] not in studies:
         sys.exit(__doc__)
     studies[sys.argv[1]](Study(*sys.argv[2:]))

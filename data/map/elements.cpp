@@ -5,8 +5,12 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
+#include <stdexcept>
 
+#include "data/plates/truth.h"
+#include "data/sensors/rig.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 
@@ -78,14 +82,9 @@ class Hills {
 // Of the cells of one hill.
 Element measured(const NamedMap& map, std::size_t top, const std::vector<std::size_t>& cells) {
   const MapCells& m = map.cells;
-  const auto width = static_cast<std::size_t>(m.region.width);
   const Pitch cell = map.cell_mm;
-  const auto x = [&](std::size_t c) {
-    return (static_cast<double>(m.region.left) + static_cast<double>(c % width) + 0.5) * cell.x;
-  };
-  const auto y = [&](std::size_t c) {
-    return (static_cast<double>(m.region.bottom) + static_cast<double>(c / width) + 0.5) * cell.y;
-  };
+  const auto x = [&](std::size_t c) { return centre_of(map, c).first; };
+  const auto y = [&](std::size_t c) { return centre_of(map, c).second; };
   const auto error = [&](std::size_t c) { return m.errors.empty() ? 0.0 : double{m.errors[c]}; };
   Element e{.height = m.values[top], .height_off = error(top)};
   double sum = 0, mean_x = 0, mean_y = 0;
@@ -109,6 +108,26 @@ Element measured(const NamedMap& map, std::size_t top, const std::vector<std::si
   e.along_x = std::sqrt((1 + cosine) / 2), e.along_y = std::copysign(std::sqrt((1 - cosine) / 2), xy);
   return e;
 }
+
+// Elements of one kind, each in its place.
+class Placed : public Surface {
+ public:
+  Placed(const std::vector<Element>& found, const Plate& kind) : found_(found), kind_(kind) {
+    extent_.max_height = kind.max_height();
+    extent_.uniform_in_x = kind.uniform_in_x();
+  }
+  double height(double x_mm, double y_mm) const override {
+    double highest = 0;
+    for (const Element& e : found_)
+      highest = std::max(
+          highest, kind_.height(Plate::kWidthMm / 2 + x_mm - e.x_mm, Plate::kLengthMm / 2 + y_mm - e.y_mm));
+    return highest;
+  }
+
+ private:
+  std::vector<Element> found_;
+  Plate kind_;
+};
 
 // Of two elements; of lines across the first.
 double distance(const Element& a, const Element& b) {
@@ -153,13 +172,54 @@ std::string elements_text(const std::vector<Element>& elements) {
          (std::isfinite(pitch) ? ", " + format(pitch, 2) + " mm apart" : "");
 }
 
+Plate kind_of_elements(const std::string& name) {
+  const bool word = std::ranges::all_of(name, [](char c) { return c >= 'a' && c <= 'z'; });
+  Plate kind = Plate::named(word ? name + format(rig::kTextureToMm - rig::kTextureFromMm, 0) : name);
+  if (kind.crests().size() != 1 || kind.min_height() < 0)
+    throw std::invalid_argument(
+        "elements: expected bumps, ridges or blobs, or a plate with one element in its "
+        "middle, found " +
+        name + ", whose plate has " + std::to_string(kind.crests().size()) +
+        (kind.min_height() < 0 ? " and troughs" : ""));
+  return kind;
+}
+
+Plate plate_of(const std::vector<Element>& found, const Plate& kind) {
+  return {"stated", std::make_shared<const Placed>(found, kind)};
+}
+
+void draw_as(NamedMap& map, const Plate& kind) {
+  const std::vector<Element> found = elements(map);
+  const Plate drawn = plate_of(found, kind);
+  std::vector<Plate> moved;
+  for (const double x : {-1, 1}) {
+    for (const double y : {-1, 1}) {
+      std::vector<Element> places = found;
+      for (Element& e : places) e.x_mm += x * e.x_off_mm, e.y_mm += y * e.y_off_mm;
+      moved.push_back(plate_of(places, kind));
+    }
+  }
+  map.cells.errors.assign(map.cells.values.size(), std::nanf(""));
+  for (std::size_t c = 0; c < map.cells.values.size(); ++c) {
+    if (std::isnan(map.cells.values[c])) continue;
+    const auto [x, y] = centre_of(map, c);
+    const double value = truth_value(drawn, x, y);
+    double most = 0;
+    for (const Plate& plate : moved) most = std::max(most, std::abs(truth_value(plate, x, y) - value));
+    map.cells.values[c] = static_cast<float>(value), map.cells.errors[c] = static_cast<float>(most);
+  }
+}
+
 void ElementScores::add(const NamedMap& map) {
   NamedMap truth = map;
   truth.cells.values = map.truth, truth.cells.errors.clear();
   for (std::size_t c = 0; c < map.truth.size(); ++c)
     if (std::isnan(map.cells.values[c])) truth.cells.values[c] = map.cells.values[c];
   std::vector<Element> left = elements(map);
-  for (const Element& wanted : elements(truth)) {
+  const std::vector<Element> there = elements(truth);
+  if (left.size() > 1 && there.size() > 1)
+    pitch_errors_mm.push_back(std::abs(pitch_mm(left) - pitch_mm(there)));
+  for (const Element& wanted : there) {
     ++existing;
     const auto nearest =
         std::ranges::min_element(left, {}, [&](const Element& e) { return distance(wanted, e); });
@@ -169,10 +229,6 @@ void ElementScores::add(const NamedMap& map) {
     left.erase(nearest);
   }
   invented += left.size();
-}
-
-double ElementScores::median_mm() const {
-  return distances_mm.empty() ? std::nan("") : median(std::vector(distances_mm));
 }
 
 }  // namespace supertac

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "data/map/map_file.h"
+#include "data/plates/plate.h"
 
 namespace supertac {
 
@@ -34,17 +35,29 @@ double pitch_mm(const std::vector<Element>& elements);
 /// Like: 6 elements, 5.99 mm apart
 std::string elements_text(const std::vector<Element>& elements);
 
+/// The kind of an element that a user states: bumps, ridges or blobs, or a plate with one element in its
+/// middle (as Plate::named(), an STL file too). Throws as Plate::named(), and std::invalid_argument for waves
+/// and for another number of elements.
+Plate kind_of_elements(const std::string& name);
+
+/// A plate with an element of `kind` in each place; where several reach, the highest. Lines lie along x, as
+/// on every plate, and go on beyond what was felt.
+Plate plate_of(const std::vector<Element>& found, const Plate& kind);
+
+/// Draws the map anew: what was felt becomes plate_of(elements(map), kind), and an error how far that moves
+/// when all places move by as much as they may be off, in the worst of the four directions.
+void draw_as(NamedMap& map, const Plate& kind);
+
 /// How the elements of a map stand beside those of its truth, taken in the same way: a true one is found when
 /// one that no other has taken lies within kFoundMm, of lines across the line; what is left over is false.
 struct ElementScores {
   static constexpr double kFoundMm = 1;
   std::size_t existing = 0, found = 0, invented = 0;
-  std::vector<double> distances_mm = {};  ///< of those found
+  std::vector<double> distances_mm = {};     ///< of those found
+  std::vector<double> pitch_errors_mm = {};  ///< of maps with a pitch
 
   /// A map with truth.
   void add(const NamedMap& map);
-  /// NaN where none was found.
-  double median_mm() const;
 };
 
 }  // namespace supertac

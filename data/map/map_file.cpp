@@ -156,6 +156,13 @@ std::vector<Triangle> solid_of(const NamedMap& map) {
 
 }  // namespace
 
+std::pair<double, double> centre_of(const NamedMap& map, std::size_t cell) {
+  const auto i = static_cast<std::int64_t>(cell);
+  const MapRegion& r = map.cells.region;
+  return {(static_cast<double>(r.left + i % r.width) + 0.5) * map.cell_mm.x,
+          (static_cast<double>(r.bottom + i / r.width) + 0.5) * map.cell_mm.y};
+}
+
 void check_map_path(const std::string& path) {
   for (const char* ending : {".png", ".safetensors", ".csv", ".stl"})
     if (path.ends_with(ending)) return;

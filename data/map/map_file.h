@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/map/surface_map.h"
@@ -15,6 +16,9 @@ struct NamedMap {
   Pitch cell_mm;
   std::vector<float> truth = {};  ///< of the cells, where it is known
 };
+
+/// Of a cell (mm), x and y.
+std::pair<double, double> centre_of(const NamedMap& map, std::size_t cell);
 
 /// Throws std::invalid_argument unless `path` ends with one of the endings of write_maps().
 void check_map_path(const std::string& path);

@@ -226,6 +226,7 @@ TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   }
   EXPECT_GE(maps.tensors().size(), 6U);
   for (const char* of : {"of_pass", "of_surface"}) EXPECT_GT(json["map"][of]["psnr_mean_db"], 5) << of;
+  EXPECT_TRUE(json["map"]["surfaces"].begin()->contains("pitch_mm"));
   double ssim = 0, windows = 0;  // over passes as over windows
   for (const auto& pass : json["over_passes"]["passes"]) {
     ssim += pass["ssim"].get<double>() * pass["windows"].get<double>();

@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 
@@ -94,6 +95,14 @@ TEST_F(Streaming, TheMapOfARecordingHasTheBitsOfTheWindowsMap) {
   for (std::size_t i = 0; i < values.size(); ++i)
     ASSERT_EQ(std::bit_cast<std::uint32_t>(values[i]), std::bit_cast<std::uint32_t>(cells.values[i])) << i;
   expect_failure(stream("--recording recording --map map.npy"), 2, "written as .png, .safetensors");
+  expect_failure(stream("--recording recording --elements bumps"), 2, "only with --map");
+  expect_failure(stream("--recording recording --map m.png --elements 3_Bumps"), 2,
+                 "one element in its middle");
+  ASSERT_EQ(stream("--recording recording --map stated.safetensors --elements bumps").code, 0);
+  const std::vector<float> stated = kept("stated.safetensors").f32("surface.values");
+  ASSERT_EQ(stated.size(), values.size());
+  for (std::size_t i = 0; i < values.size(); ++i)
+    ASSERT_TRUE(std::isnan(values[i]) ? std::isnan(stated[i]) : stated[i] >= 0 && stated[i] <= 1) << i;
   plug_in();
   expect_failure(stream("--board " + board() + " --seconds 0.5 --map map.png"), 1,
                  "no picture's place is known");

@@ -4,8 +4,10 @@
 
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "data/plates/truth.h"
+#include "io/numbers/median.h"
 #include "io/numbers/random.h"
 
 namespace supertac {
@@ -61,7 +63,7 @@ TEST(Elements, NoiseBelowHalfOfATopMakesNone) {
     scores.add(map);
     EXPECT_EQ(scores.found, scores.existing);
     EXPECT_EQ(scores.invented, 0U) << seed;
-    EXPECT_LT(scores.median_mm(), 0.1);
+    EXPECT_LT(median(std::vector(scores.distances_mm)), 0.1);
   }
 }
 
@@ -78,6 +80,7 @@ TEST(Elements, AMoveOfAMillimetreIsFoundAndThreeAreNot) {
     scores.add(map);
     EXPECT_EQ(scores.existing, 4U);
     EXPECT_EQ(scores.found, cells == 1 ? 4U : 0U);
+    EXPECT_LT(scores.pitch_errors_mm.at(0), 0.01);
     EXPECT_EQ(scores.invented, cells == 1 ? 0U : 4U);
   }
 }
@@ -97,6 +100,38 @@ TEST(Elements, OfAnEmptyOrFlatMapAreNone) {
   const std::vector<Element> none = elements(map_of("plain", kPlate));
   EXPECT_TRUE(none.empty());
   EXPECT_EQ(elements_text(none), "0 elements");
+}
+
+// Of a cell of a map, the largest of what is drawn and what is true; edges of ridges and bumps are steep.
+float furthest(const NamedMap& map) {
+  float most = 0;
+  for (std::size_t c = 0; c < map.truth.size(); ++c)
+    most = std::max(most, std::abs(map.cells.values[c] - map.truth[c]));
+  return most;
+}
+
+TEST(Elements, AreDrawnAsTheirKindWhateverTheirWidth) {
+  // Each kind is felt as the other: places are right, widths are not.
+  for (const auto& [felt, there, kind] :
+       {std::tuple("bumps9", "4_Ridges", "ridges"), std::tuple("ridges12", "3_Bumps", "bumps"),
+        std::tuple("blobs12h1.5", "blobs12h3", "blobs36h3")}) {
+    NamedMap map = map_of(felt, kPlate);
+    map.truth = map_of(there, kPlate).truth;
+    EXPECT_GT(furthest(map), 0.5F) << felt;
+    map.cells.values[5] = std::numeric_limits<float>::quiet_NaN();
+    draw_as(map, kind_of_elements(kind));
+    EXPECT_TRUE(std::isnan(map.cells.values[5]) && std::isnan(map.cells.errors[5]));
+    map.cells.values[5] = map.truth[5];
+    EXPECT_LT(furthest(map), 0.07F) << felt;
+    for (std::size_t c = 6; c < map.truth.size(); ++c)
+      EXPECT_LE(std::abs(map.cells.values[c] - map.truth[c]), map.cells.errors[c] + 0.03F) << felt;
+  }
+}
+
+TEST(Elements, TheirKindIsOneElementOnAFlatPlate) {
+  EXPECT_EQ(kind_of_elements("bumps").max_height(), 2.5);
+  for (const char* name : {"3_Bumps", "waves", "plain36", "bumps12"})
+    EXPECT_THROW(kind_of_elements(name), std::invalid_argument) << name;
 }
 
 TEST(Elements, HoldTheirPlaceWithinWhatTheySay) {
