@@ -145,7 +145,7 @@ def shown_elements():
             total = {key: sum(int(r[key]) for r in of) for key in ("existing", "found", "false")}
             known = "five networks" if network == "paper" else "left out"
             lines.append([plate, known, trial, f"{total['found']} of {total['existing']}", str(total["false"]),
-                          *(f"{mean(of, c):.2f}" for c in ("median_mm", "pitch_error_mm")),
+                          *(f"{mean(of, c):.2f}" if any(r[c] for r in of) else "" for c in ("median_mm", "pitch_error_mm")),
                           *(f"{mean(of, c):.3f}" for c in ("ssim", "stated_ssim"))])
     return table(["plate", "network", "trial", "found", "false", "off by mm", "pitch off by mm", "SSIM", "SSIM, kind stated"], lines)
 

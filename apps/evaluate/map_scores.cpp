@@ -77,9 +77,7 @@ std::vector<std::string> MapScores::lines() const {
 
 nlohmann::ordered_json MapScores::to_json() const {
   const auto number = [](double v) { return std::isfinite(v) ? nlohmann::ordered_json(v) : nullptr; };
-  const auto middle = [](std::vector<double> v) {
-    return v.empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(median(std::move(v)));
-  };
+  const auto middle = [&](std::vector<double> v) { return number(v.empty() ? NAN : median(v)); };
   nlohmann::ordered_json json;
   for (const auto& [name, scored] :
        {std::pair("of_pass", &by_pass_), std::pair("of_surface", &by_surface_)}) {
@@ -99,14 +97,8 @@ nlohmann::ordered_json MapScores::to_json() const {
     const std::vector<Element> found = elements(map);
     auto& rows = json["surfaces"][map.name] = {{"pitch_mm", number(pitch_mm(found))}};
     for (const Element& e : found)
-      rows["elements"].push_back({{"x_mm", e.x_mm},
-                                  {"y_mm", e.y_mm},
-                                  {"x_off_mm", e.x_off_mm},
-                                  {"y_off_mm", e.y_off_mm},
-                                  {"height", e.height},
-                                  {"height_off", e.height_off},
-                                  {"length_mm", e.length_mm},
-                                  {"width_mm", e.width_mm}});
+      for (auto& row = rows["elements"].emplace_back(); const auto& [name, value] : numbers_of(e))
+        row[name] = value;
   }
   return json;
 }

@@ -101,18 +101,19 @@ std::string by_height(const nlohmann::ordered_json& trust) {
 }
 
 std::string by_element(const nlohmann::ordered_json& result) {
+  if (!result.contains("map")) return "";
+  std::vector<std::string> head = {"map"};
   std::string rows;
-  if (!result.contains("map")) return rows;
-  for (const auto& [name, surface] : result["map"]["surfaces"].items())
-    for (const auto& e : surface.value("elements", nlohmann::ordered_json::array()))
-      rows += "<tr><td>" + escaped(name) + "</td>" + cell_of(e["x_mm"], 2) + cell_of(e["y_mm"], 2) +
-              cell_of(e["y_off_mm"], 2) + cell_of(e["height"], 2) + cell_of(e["height_off"], 2) +
-              cell_of(e["length_mm"], 1) + cell_of(e["width_mm"], 1) + cell_of(surface["pitch_mm"], 2) +
-              "</tr>";
-  return page_section(
-      "Elements", "what the map of all passes of a plate and trial shows; within how much it may be off",
-      page_table({"map", "x mm", "y mm", "within", "height", "within", "length mm", "width mm", "pitch mm"},
-                 rows));
+  for (const auto& [name, surface] : result["map"]["surfaces"].items()) {
+    for (const auto& e : surface.value("elements", nlohmann::ordered_json::array())) {
+      head.resize(1);
+      rows += "<tr><td>" + escaped(name) + "</td>";
+      for (const auto& [key, value] : e.items()) head.push_back(key), rows += cell_of(value, 2);
+      rows += "</tr>";
+    }
+  }
+  return page_section("Elements", "that the maps of all passes of a plate and trial show",
+                      page_table(head, rows));
 }
 
 std::string by_distance(const nlohmann::ordered_json& parts) {

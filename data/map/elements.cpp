@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 
@@ -136,6 +137,19 @@ double distance(const Element& a, const Element& b) {
 }
 
 }  // namespace
+
+std::vector<std::pair<const char*, double>> numbers_of(const Element& e) {
+  return {{"x_mm", e.x_mm},
+          {"y_mm", e.y_mm},
+          {"x_off_mm", e.x_off_mm},
+          {"y_off_mm", e.y_off_mm},
+          {"height", e.height},
+          {"height_off", e.height_off},
+          {"length_mm", e.length_mm},
+          {"width_mm", e.width_mm},
+          {"degrees", std::atan2(e.along_y, e.along_x) * 180 / std::numbers::pi},
+          {"open", e.open ? 1 : 0}};
+}
 
 std::vector<Element> elements(const NamedMap& map) {
   const std::vector<float>& values = map.cells.values;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/map/map_file.h"
@@ -19,6 +20,10 @@ struct Element {
   bool open = false;                   ///< reaches the edge of what was felt, so may go on
   bool line() const { return length_mm >= 2 * width_mm; }
 };
+
+/// Its numbers as tables have them: x_mm, y_mm, x_off_mm, y_off_mm, height, height_off, length_mm, width_mm,
+/// degrees, open.
+std::vector<std::pair<const char*, double>> numbers_of(const Element& element);
 
 /// Hills in the sense of persistence (Edelsbrunner, Letscher, Zomorodian 2002): two tops are one hill when
 /// the saddle between them is at least half as high as the lower top. Hills lower than kLowest, or lower than

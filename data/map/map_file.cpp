@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
 #include "data/map/elements.h"
@@ -107,16 +106,15 @@ void write_tensors(const OutputPath& output, const std::vector<NamedMap>& maps) 
 }
 
 std::string table_of(const std::vector<NamedMap>& maps) {
-  std::string table =
-      "map,element,x_mm,y_mm,x_off_mm,y_off_mm,height,height_off,length_mm,width_mm,degrees,open\n";
+  std::string table = "map,element";
+  for (const auto& [name, number] : numbers_of({})) table += std::string(",") + name;
+  table += "\n";
   for (const NamedMap& map : maps) {
-    int number = 0;
+    int count = 0;
     for (const Element& e : elements(map)) {
-      table += map.name + "," + std::to_string(++number);
-      for (const double v : {e.x_mm, e.y_mm, e.x_off_mm, e.y_off_mm, e.height, e.height_off, e.length_mm,
-                             e.width_mm, std::atan2(e.along_y, e.along_x) * 180 / std::numbers::pi})
-        table += "," + format(v, 3);
-      table += e.open ? ",1\n" : ",0\n";
+      table += map.name + "," + std::to_string(++count);
+      for (const auto& [name, number] : numbers_of(e)) table += "," + format(number, 3);
+      table += "\n";
     }
   }
   return table;
