@@ -1,7 +1,9 @@
 #include "hardware/collection/journal.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -10,7 +12,7 @@
 
 #include "hardware/ports/errors.h"
 #include "io/files/file.h"
-#include "io/files/system_calls.h"
+#include "io/files/sync_folder.h"
 #include "io/numbers/hash.h"
 
 namespace supertac {
@@ -76,7 +78,7 @@ std::vector<std::span<const std::byte>> parts_of(std::span<const std::byte> payl
 
 JournalWriter::JournalWriter(const std::string& path, std::string_view header, std::uint64_t most_bytes)
     : path_(path), most_bytes_(most_bytes) {
-  descriptor_ = system_calls().open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  descriptor_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   if (descriptor_ < 0) {
     throw JournalError("journal " + path + ": cannot be created: " + strerror(errno) +
                        (errno == EEXIST
@@ -89,8 +91,8 @@ JournalWriter::JournalWriter(const std::string& path, std::string_view header, s
   }
   if (error_.empty() && !sync_folder_of(path)) failed("its folder cannot be synced");
   if (!error_.empty()) {
-    (void)system_calls().close(descriptor_);
-    (void)system_calls().unlink(path.c_str());
+    (void)::close(descriptor_);
+    (void)::unlink(path.c_str());
     throw JournalError(error_);
   }
   thread_ = std::thread([this] { run(); });
@@ -161,7 +163,7 @@ void JournalWriter::run_sync() {
 }
 
 void JournalWriter::sync() {
-  if (system_calls().fsync(descriptor_) != 0) failed("cannot be synced");
+  if (::fsync(descriptor_) != 0) failed("cannot be synced");
 }
 
 void JournalWriter::failed(const std::string& what) {
@@ -199,7 +201,7 @@ void JournalWriter::write_chunk(Stream stream, double time_s, std::span<const st
   memcpy(chunk.data() + 12, &sum, sizeof sum);
   chunk.insert(chunk.end(), payload.begin(), payload.end());
   for (std::size_t done = 0; done < chunk.size();) {
-    const ssize_t count = system_calls().write(descriptor_, chunk.data() + done, chunk.size() - done);
+    const ssize_t count = ::write(descriptor_, chunk.data() + done, chunk.size() - done);
     if (count < 0 && errno == EINTR) continue;
     if (count == 0) errno = ENOSPC;
     if (count <= 0) return failed("cannot be written");
@@ -219,7 +221,7 @@ void JournalWriter::close() {
     if (sync_thread_.joinable()) sync_thread_.join();
     sync();
     const int descriptor = std::exchange(descriptor_, -1);
-    if (system_calls().close(descriptor) != 0) failed("cannot be closed");
+    if (::close(descriptor) != 0) failed("cannot be closed");
   }
   check();
 }
@@ -229,7 +231,7 @@ void JournalWriter::discard() {
     close();
   } catch (const JournalError&) {  // it goes anyway
   }
-  (void)system_calls().unlink(path_.c_str());
+  (void)::unlink(path_.c_str());
 }
 
 const std::vector<JournalRecord>& Journal::of(Stream stream) const {

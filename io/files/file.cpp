@@ -1,15 +1,18 @@
 #include "io/files/file.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <utility>
 
-#include "io/files/system_calls.h"
+#include "io/files/sync_folder.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -39,7 +42,7 @@ const char* advice(int error) {
 
 // Not retried: on Linux the descriptor is gone even after EINTR, and may by now be somebody else's.
 void close_quietly(int& file) {
-  if (file >= 0) system_calls().close(file);
+  if (file >= 0) ::close(file);
   file = -1;
 }
 
@@ -68,14 +71,27 @@ void remove_leftovers(const std::string& path) {
     if (!name.starts_with(prefix)) continue;
     const auto process =
         parse_uint(name.substr(prefix.size(), name.find('-', prefix.size()) - prefix.size()));
-    if (process && !is_running(*process)) system_calls().unlink(entry->path().c_str());
+    if (process && !is_running(*process)) ::unlink(entry->path().c_str());
   }
+}
+
+// Fails with EEXIST where there is something of the new name.
+int rename_new(const char* from, const char* to) {
+  if (::renameat2(AT_FDCWD, from, AT_FDCWD, to, RENAME_NOREPLACE) == 0) return 0;
+  if (errno != EINVAL && errno != ENOSYS) return -1;
+  // File systems without it (NFS, some of FUSE): a second name for a file. A folder has one name only, but
+  // never takes the place of one that holds anything.
+  if (::link(from, to) == 0) return ::unlink(from);
+  if (errno == EEXIST) return -1;
+  struct stat status {};
+  if (::lstat(to, &status) == 0) return errno = EEXIST, -1;
+  return std::rename(from, to);
 }
 
 // publish() without the sync.
 std::string rename_to(const std::string& finished, const OutputPath& output) {
   if (!output.when_taken) {
-    if (system_calls().rename(finished.c_str(), output.path.c_str()) != 0)
+    if (std::rename(finished.c_str(), output.path.c_str()) != 0)
       fail(output.path, "rename into place", errno);
     return output.path;
   }
@@ -85,7 +101,7 @@ std::string rename_to(const std::string& finished, const OutputPath& output) {
     if (number > 1)
       name.replace_filename(wished.stem().string() + "-" + std::to_string(number) +
                             wished.extension().string());
-    if (system_calls().rename_new(finished.c_str(), name.c_str()) == 0) {
+    if (rename_new(finished.c_str(), name.c_str()) == 0) {
       if (number > 1)
         output.when_taken(output.path + ": appeared meanwhile and is not replaced; what was made is " +
                           name.string());
@@ -103,6 +119,17 @@ void sync_name(const std::string& name) {
 
 }  // namespace
 
+bool sync_folder_of(const std::string& path) {
+  int folder = retry([&] { return ::open(directory_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); });
+  if (folder < 0) return false;
+  // EINVAL: a file system that has nothing to sync for a folder.
+  const bool synced = retry([&] { return ::fsync(folder); }) == 0 || errno == EINVAL;
+  const int error = errno;
+  close_quietly(folder);  // nothing was written through it
+  errno = error;
+  return synced;
+}
+
 bool is_running(std::uint64_t process) {
   const auto id = static_cast<pid_t>(process);
   return static_cast<std::uint64_t>(id) != process || id < 1 || ::kill(id, 0) == 0 || errno != ESRCH;
@@ -114,10 +141,10 @@ FileError::FileError(const std::string& path, const std::string& problem)
 FileReader::FileReader(const std::string& path) : path_(path) {
   // O_NONBLOCK: opening a pipe must not wait for a writer.
   const int flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK;
-  file_ = retry([&] { return system_calls().open(path.c_str(), flags, 0); });
+  file_ = retry([&] { return ::open(path.c_str(), flags); });
   if (file_ < 0) fail(path, "open the file", errno);
   struct stat status {};
-  if (system_calls().fstat(file_, &status) != 0) {
+  if (::fstat(file_, &status) != 0) {
     const int error = errno;
     close_quietly(file_);
     fail(path, "look at the file", error);
@@ -134,7 +161,7 @@ FileReader::~FileReader() { close_quietly(file_); }
 
 void FileReader::read(std::span<std::byte> bytes) {
   while (!bytes.empty()) {
-    const ssize_t count = retry([&] { return system_calls().read(file_, bytes.data(), bytes.size()); });
+    const ssize_t count = retry([&] { return ::read(file_, bytes.data(), bytes.size()); });
     if (count < 0) fail(path_, "read", errno);
     if (count == 0) {
       throw FileError(path_, "ends after " + std::to_string(position_) + " bytes, expected " +
@@ -185,7 +212,7 @@ void AtomicFile::open_temporary() {
   for (int attempt = 0; attempt < 100; ++attempt) {
     const std::string name = prefix + std::to_string(next++);
     const int flags = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC;
-    file_ = retry([&] { return system_calls().open(name.c_str(), flags, 0666); });
+    file_ = retry([&] { return ::open(name.c_str(), flags, 0666); });
     if (file_ >= 0) {
       temporary_ = name;
       return;
@@ -197,13 +224,13 @@ void AtomicFile::open_temporary() {
 
 AtomicFile::~AtomicFile() {
   close_quietly(file_);
-  if (!temporary_.empty()) system_calls().unlink(temporary_.c_str());
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
 void AtomicFile::write(std::span<const std::byte> bytes) {
   if (file_ < 0) throw std::invalid_argument("AtomicFile: write after commit (" + path_ + ")");
   while (!bytes.empty()) {
-    const ssize_t count = retry([&] { return system_calls().write(file_, bytes.data(), bytes.size()); });
+    const ssize_t count = retry([&] { return ::write(file_, bytes.data(), bytes.size()); });
     if (count < 0) fail(path_, "write", errno);
     if (count == 0) fail(path_, "write", ENOSPC);
     bytes = bytes.subspan(static_cast<std::size_t>(count));
@@ -214,8 +241,8 @@ void AtomicFile::write(std::string_view text) { write(std::as_bytes(std::span(te
 
 void AtomicFile::commit() {
   if (file_ < 0) throw std::invalid_argument("AtomicFile: commit twice (" + path_ + ")");
-  if (retry([&] { return system_calls().fsync(file_); }) != 0) fail(path_, "sync to disk", errno);
-  const int closed = system_calls().close(std::exchange(file_, -1));
+  if (retry([&] { return ::fsync(file_); }) != 0) fail(path_, "sync to disk", errno);
+  const int closed = ::close(std::exchange(file_, -1));
   if (closed != 0 && errno != EINTR) fail(path_, "close", errno);
   const std::string name = rename_to(temporary_, {path_, output_.when_taken});
   temporary_.clear();

@@ -1,6 +1,7 @@
 #include "io/files/scratch_file.h"
 
 #include <fcntl.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstdlib>
@@ -8,7 +9,7 @@
 #include <random>
 
 #include "io/files/file.h"
-#include "io/files/system_calls.h"
+#include "io/files/sync_folder.h"
 
 namespace supertac {
 namespace {
@@ -34,16 +35,16 @@ std::string name_in(const std::string& folder) {
 
 ScratchFile::ScratchFile() : folder_(temporary_folder()) {
   const std::string name = name_in(folder_);
-  file_ = system_calls().open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+  file_ = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
   if (file_ < 0) fail(folder_, "make", errno);
-  system_calls().unlink(name.c_str());
+  ::unlink(name.c_str());
 }
 
-ScratchFile::~ScratchFile() { system_calls().close(file_); }
+ScratchFile::~ScratchFile() { ::close(file_); }
 
 std::uint64_t ScratchFile::append(std::span<const float> numbers) {
   for (auto bytes = std::as_bytes(numbers); !bytes.empty();) {
-    const ssize_t count = retry([&] { return system_calls().write(file_, bytes.data(), bytes.size()); });
+    const ssize_t count = retry([&] { return ::write(file_, bytes.data(), bytes.size()); });
     if (count <= 0) fail(folder_, "write", count < 0 ? errno : ENOSPC);
     bytes = bytes.subspan(static_cast<std::size_t>(count));
   }
@@ -55,8 +56,8 @@ std::uint64_t ScratchFile::append(std::span<const float> numbers) {
 void ScratchFile::read(std::uint64_t place, std::span<float> numbers) const {
   std::uint64_t offset = place * sizeof(float);
   for (auto bytes = std::as_writable_bytes(numbers); !bytes.empty();) {
-    const ssize_t count = retry(
-        [&] { return system_calls().pread(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset)); });
+    const ssize_t count =
+        retry([&] { return ::pread(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset)); });
     if (count <= 0) fail(folder_, "read", count < 0 ? errno : EIO);
     offset += static_cast<std::uint64_t>(count);
     bytes = bytes.subspan(static_cast<std::size_t>(count));
