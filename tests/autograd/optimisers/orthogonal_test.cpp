@@ -1,4 +1,4 @@
-#include "autograd/optimisers/orthogonal.h"
+#include "autograd/optimisers/adam.h"
 
 #include <vector>
 
