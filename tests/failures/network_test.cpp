@@ -68,11 +68,6 @@ TEST(Failures, F9DeepStacksOfResidualBlocksBlowUpWithLargerWeights) {
   EXPECT_LT(growth(24, true), 4);
 }
 
-TEST(Failures, F10AReductionThatLeavesNoChannelIsRefused) {
-  Rng rng(1);
-  EXPECT_THROW(ChannelAttention(4, 8, rng), std::invalid_argument);
-}
-
 // Saturated gates stop learning, and a block with gates of 0 does nothing. The skip passes both the picture
 // and the gradient on, so that the rest of the network goes on learning; no other safeguard is needed.
 TEST(Failures, F10SaturatedGatesLeaveTheSkip) {

@@ -1,5 +1,4 @@
-// A packed corpus (pack.py) as regression test: the same function that the fuzzer calls, on every case it
-// kept.
+// What a fuzzer has kept, as regression test. A case is a line "LENGTH NAME" and LENGTH bytes.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What must hold for the frame decoder on any bytes; the fuzzer and the corpus test call the same function.
+// What must hold for the frame decoder on any bytes.
 #pragma once
 
 #include <algorithm>

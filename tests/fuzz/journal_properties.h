@@ -1,5 +1,4 @@
-// What must hold for the journal's reader on any bytes; the fuzzer and the corpus test call the same
-// function.
+// What must hold for the journal's reader on any bytes.
 #pragma once
 
 #include <cstring>

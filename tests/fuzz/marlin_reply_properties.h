@@ -1,5 +1,4 @@
-// What must hold for the Marlin link whatever the firmware answers; the fuzzer and the corpus test call the
-// same function.
+// What must hold for the Marlin link whatever the firmware answers.
 #pragma once
 
 #include <algorithm>

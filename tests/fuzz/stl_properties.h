@@ -1,4 +1,4 @@
-// What must hold for the STL reader on any bytes; the fuzzer and the corpus test call the same function.
+// What must hold for the STL reader on any bytes.
 #pragma once
 
 #include <cmath>

@@ -49,7 +49,7 @@ const std::map<std::string, std::vector<std::string>> kGood = {
     {"export", {"model", "--onnx", "new.onnx"}},
     {"import", {"data", "--out", "new"}},
     {"info", {"data/good"}},
-    {"plate", {"--plate", "plain", "--resolution", "5", "--out", "new.stl"}},
+    {"plate", {"--plate", "plain", "--out", "new.stl"}},
     {"simulate", {"--out", "new", "--plates", "plain", "--passes", "1", "--trials", "1", "--speeds", "50"}},
     {"stream", {"--model", "model", "--recording", "data/good"}},
     {"sweep", {"--out", "new", "--data", "data"}},
@@ -60,9 +60,9 @@ constexpr double kPatienceS = 1, kHangS = 10;
 constexpr long kMostKilobytes = 1 << 20;
 constexpr std::uint64_t kMost = 1 << 26;  // bytes of a file that is compared
 // By --force a user gives up what these name, and nothing else.
-constexpr const char* kOutputs[] = {"--out",        "--json",         "--gcode",    "--outputs",
-                                    "--capture",    "--report",       "--pictures", "--onnx",
-                                    "--board-link", "--printer-link", "--mcap",     "--c99"};
+constexpr const char* kOutputs[] = {"--out",          "--json",     "--outputs", "--capture",
+                                    "--report",       "--pictures", "--onnx",    "--board-link",
+                                    "--printer-link", "--mcap",     "--c99"};
 // What no program may change.
 constexpr const char* kKept[] = {"precious", "precious.stl", "model", "data/good"};
 
