@@ -24,15 +24,14 @@ void declare(Arguments& a) {
       "parts of a training that kept a ledger; step FILE --data DIR --at N: opens one step of it, with every "
       "operator; picture FILE --recording FILE --at S --out FILE: writes one picture with every array on the "
       "way to it; "
-      "ledgers FILE OTHER: the first difference of two, with --data down to an operator and entry; "
-      "or of two steps that were opened with --json");
+      "ledgers FILE OTHER: the first difference of two, or of two steps that were opened with --json");
   a.positional("FILE", "what is checked", false);
   a.positional("OTHER", "what it is compared with", false);
   a.option("break", "OP",
            "gradients: plant errors in the reverse step of this op, or of 'all', one after the other: wrong "
            "sign, doubled, without a term, at the wrong index; each has to be found");
   a.flag("report", "bits: print the rows of docs/bits.md for this machine");
-  a.option("data", "DIR", "training, step, ledgers, chain: the recordings that the model was trained on");
+  a.option("data", "DIR", "training, step, chain: the recordings that the model was trained on");
   a.option("picture", "HEX", "chain: what the self-test said on the device, 16 digits");
   a.option("segments", "K", "training: how many of its twenty parts are repeated", "1");
   a.option("seed", "N", "training: draws them", "0");
@@ -47,9 +46,8 @@ void declare(Arguments& a) {
       "step: the arrays of those whose name begins so are written to --out (3/ is the fourth micro-batch, "
       "update/ what the optimiser did)");
   a.option("out", "FILE",
-           "step, ledgers, picture: arrays as safetensors, which examples/referee.py, or recompute.py for a "
-           "picture, computes "
-           "again with NumPy")
+           "step, picture: arrays as safetensors, which examples/referee.py, or recompute.py for a picture, "
+           "computes again with NumPy")
       .writes();
 }
 

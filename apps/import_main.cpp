@@ -10,7 +10,6 @@
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
-#include "apps/import/page.h"
 #include "apps/import/tables.h"
 #include "data/plates/plate_file.h"
 #include "data/recordings/imports/table_import.h"
@@ -32,10 +31,6 @@ void declare(Arguments& arguments) {
       .required("out", "DIR", "folder for the recordings, one file per pass")
       .writes()
       .option("speed", "MM_PER_S", "sliding speed of the passes in mm/s", "10")
-      .option("pictures", "DIR",
-              "write index.html: the signals of each pass of the rig's text files under the plate they were "
-              "fitted to")
-      .writes()
       .flag("skip-bad", "leave out files and folders that are no recordings instead of giving up");
   declare_tables(arguments);
 }
@@ -65,9 +60,9 @@ std::optional<SafetensorsFile> pairs_of(const std::string& input) {
 }
 
 int convert_pairs(const Arguments& arguments, const SafetensorsFile& file) {
-  refuse_others(arguments, "a file of pairs is converted as it is",
-                {"speed", "pictures", "skip-bad", "columns", "plate", "positions", "truth", "truth-times",
-                 "truth-range", "group"});
+  refuse_others(
+      arguments, "a file of pairs is converted as it is",
+      {"speed", "skip-bad", "columns", "plate", "positions", "truth", "truth-times", "truth-range", "group"});
   std::optional<Sensor> sensor;
   if (arguments.given("sensor")) sensor = read_sensor(arguments.text("sensor"));
   const std::vector<Recording> recordings = import_pairs(file, sensor);
@@ -89,8 +84,7 @@ int convert_pairs(const Arguments& arguments, const SafetensorsFile& file) {
 }
 
 int recover(const Arguments& arguments) {
-  refuse_others(arguments, "--journal stands alone with --out",
-                {"INPUT", "speed", "skip-bad", "pictures", "sensor"});
+  refuse_others(arguments, "--journal stands alone with --out", {"INPUT", "speed", "skip-bad", "sensor"});
   const std::string out = arguments.text("out");
   OutputFolder folder(arguments.output("out"));
   const PassesReport report = write_passes(arguments, arguments.text("journal"), out, folder);
@@ -110,22 +104,15 @@ int run(Arguments& arguments) {
   if (!arguments.given("INPUT")) throw UsageError("expected INPUT or --journal FILE, found neither");
   const std::string input = arguments.text("INPUT");
   if (const auto pairs = pairs_of(input)) return convert_pairs(arguments, *pairs);
-  if (arguments.given("sensor")) {
-    refuse_others(arguments, "pictures are made of the rig's text files only", {"pictures"});
-    return import_tables(arguments, input);
-  }
+  if (arguments.given("sensor")) return import_tables(arguments, input);
   const std::string out = arguments.text("out");
   OutputFolder folder(arguments.output("out"));
-  std::optional<OutputFolder> pictures;
-  if (arguments.given("pictures")) pictures.emplace(arguments.output("pictures"));
   std::size_t bad = 0, reliable = 0, recordings = 0;
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
-  ImportPage page;
   const auto keep = [&](const ImportedPass& pass) {
     const std::string name = recording_file_name(pass.recording);
     add_parent_file("text", pass.path);
     write_recording(folder.add(name), pass.recording);
-    if (pictures) page.add(pass);
     arguments.print(pass.summary());
     files.push_back(pass.to_json());
     reliable += pass.registration.reliable;
@@ -137,9 +124,7 @@ int run(Arguments& arguments) {
                        for (const ImportedPass& pass : plate) keep(pass);
                        keep_plate_file(plate.front().plate_file, folder.path());
                      });
-  if (pictures) write_file(pictures->add("index.html"), page.html(arguments.command_line()));
   folder.keep();
-  if (pictures) pictures->keep();
   arguments.write_json({{"folder", out},
                         {"recordings", recordings},
                         {"reliable", reliable},

@@ -36,37 +36,13 @@ std::vector<Plate> read_plates(const Arguments& arguments) {
   return plates;
 }
 
-Pitch pitch_of(const Arguments& arguments) {
-  const std::vector<double> mm = arguments.numbers("pitch", 0.1, 100);
-  if (mm.empty() || mm.size() > 2) throw UsageError("--pitch: expected one number of mm, or two");
-  return {mm.front(), mm.back()};
-}
-
-TaxelArray read_array(const Arguments& arguments) {
-  const std::string text = arguments.text("array");
-  const std::size_t x = std::min(text.find('x'), text.size());
-  const auto rows = parse_int(text.substr(0, x)),
-             columns = parse_int(text.substr(std::min(x + 1, text.size())));
-  const auto within = [](const std::optional<std::int64_t>& n) { return n && *n >= 1 && *n <= 64; };
-  if (!within(rows) || !within(columns))
-    throw UsageError("--array expects ROWSxCOLUMNS, 1 to 64 each, found " + text);
-  return {.rows = static_cast<int>(*rows),
-          .columns = static_cast<int>(*columns),
-          .pitch_mm = pitch_of(arguments)};
-}
-
 SimulatorSettings read_settings(const Arguments& arguments, const Sensor& sensor) {
   SimulatorSettings settings;
   if (arguments.given("sensor")) {
-    for (const char* other : {"array", "pitch"})
-      if (arguments.given(other))
-        throw UsageError(std::string("--sensor: its file says what --") + other + " would; leave that out");
     settings.array = sensor.array;
     settings.rate_hz = sensor.rate_hz;
     settings.body = sensor.body;
     settings.filter_s = 0, settings.with_adc = false;  // the rig's board has these
-  } else {
-    settings.array = read_array(arguments);
   }
   for (const std::string& term : arguments.list("without")) {
     settings = read_option("without", [&] { return without_term(settings, term); });
@@ -107,8 +83,7 @@ std::vector<Job> plan_passes(const Arguments& arguments, const std::vector<Plate
 
 std::vector<Job> plan_presses(const Arguments& arguments, const Sensor& sensor, OutputFolder& folder) {
   constexpr int kPressesOfARecording = 125;
-  for (const char* other :
-       {"plates", "speeds", "trials", "passes", "from", "to", "array", "pitch", "without"})
+  for (const char* other : {"plates", "speeds", "trials", "passes", "from", "to", "without"})
     if (arguments.given(other))
       throw UsageError(std::string("--presses: nothing slides over a plate; leave --") + other + " out");
   const int scale = std::stoi(arguments.choice("scale", {"2", "4", "8", "16"}));
@@ -189,8 +164,6 @@ void declare(Arguments& arguments) {
               "--sensor FILE "
               "first")
       .option("scale", "N", "of --presses: truth N times as fine as the array: 2, 4, 8 or 16", "4")
-      .option("array", "ROWSxCOLUMNS", "taxels of the finger, 1 to 64 either way", "4x4")
-      .option("pitch", "MM", "from taxel to taxel: one number, or along a row and from row to row, 3,4", "3")
       .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms(), ", "))
       .option("seed", "N", "the same seed gives the same files", "1");
 }

@@ -17,7 +17,6 @@
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/folder_lock.h"
-#include "io/files/json.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 #include "models/inference/evaluation.h"
@@ -32,12 +31,16 @@ void declare(Arguments& a) {
   a.required("out", "DIR", "sweep.csv, chart.html and models; a sweep that was stopped goes on where it was")
       .writes();
   a.required("data", "DIR", "recordings to train and test on");
-  a.option("preset", "A,B,...", "recipes to start from: paper, tiny, frame", "paper");
+  // The axes of the grid, which may grow: a row of the table says where on them it stands.
+  a.option("preset", "A,B,...", "recipes to start from: paper, tiny, frame", "paper").decides_nothing();
   a.option("timesteps", "T,...",
-           "samples per window, multiples of 16, 32 to 512, or 1 (default: the preset's)");
-  a.option("latent", "LD,...", "latent numbers per group of taxels (default: the preset's)");
-  a.option("scale", "N,...", "pictures N times as fine as the array: 2, 4, 8, 16 (default: the preset's)");
-  a.option("seeds", "N,...", "of split, initial weights, order, noise", "0");
+           "samples per window, multiples of 16, 32 to 512, or 1 (default: the preset's)")
+      .decides_nothing();
+  a.option("latent", "LD,...", "latent numbers per group of taxels (default: the preset's)")
+      .decides_nothing();
+  a.option("scale", "N,...", "pictures N times as fine as the array: 2, 4, 8, 16 (default: the preset's)")
+      .decides_nothing();
+  a.option("seeds", "N,...", "of split, initial weights, order, noise", "0").decides_nothing();
   declare_training(a);
   declare_window_training(a);
   a.more().option("limit", "N", "score at most N test windows, evenly spread; 0 = all", "0");
@@ -127,21 +130,15 @@ std::vector<Recipe> grid_of(const Arguments& a) {
 
 // Figures that cannot be compared do not mix: whatever a table's rows have in common has to stay.
 void check_settings(const Arguments& a) {
-  Json settings;
-  for (const char* option :
-       {"augment", "batch", "beta", "epochs", "history", "interval-factor", "learning-rate", "leave-out",
-        "limit", "optimizer", "plates", "random-plates", "range", "rate", "scaling", "split", "stride"})
-    settings[option] = a.given(option) || !a.text(option).empty() ? a.text(option) : "the preset's";
-  settings["last-frame"] = a.flag("last-frame");
-  settings["data"] = hash_of_recordings(a.text("data"), a.list("plates"));
   const std::string path = a.text("out") + "/settings.json";
-  if (!fs::exists(path)) return write_file(path, settings.dump(2) + "\n");
-  const auto before = parse_json_limited(read_text_file(path, 1 << 20));
-  for (const auto& [key, value] : settings.items())
-    if (!before.contains(key) || before[key] != value)
-      throw FileError(path, "this sweep began with " + key + " " +
-                                (before.contains(key) ? before[key].dump() : "unset") + ", now it is " +
-                                value.dump() + "; give the same options, or choose another --out");
+  const std::string now =
+      Json{{"command", a.deciding_options()}, {"data", hash_of_recordings(a.text("data"), a.list("plates"))}}
+          .dump();
+  if (!fs::exists(path)) return write_file(path, now);
+  const std::string before = read_text_file(path, 1 << 20);
+  if (before != now)
+    throw FileError(path, "this sweep began with " + before + ", now it is " + now +
+                              "; give the same options, or choose another --out");
 }
 
 // sweep.csv: one row for each model.

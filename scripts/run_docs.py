@@ -185,7 +185,7 @@ def main():
     if len(sys.argv) < 2 or not (pathlib.Path(sys.argv[1]) / "bin").is_dir():
         sys.exit(__doc__)
     build = pathlib.Path(sys.argv[1]).resolve()
-    environment = dict(os.environ, PATH=f"{build}/bin:{build}/examples:{os.environ['PATH']}")
+    environment = dict(os.environ, ROOT=str(ROOT), PATH=f"{build}/bin:{build}/examples:{os.environ['PATH']}")
     if environment.get("SUPERTAC_RECORDINGS"):
         environment["TEXT_DIR"] = environment["SUPERTAC_RECORDINGS"]
     chosen = [pathlib.Path(page).resolve() for page in sys.argv[2:]] or pages()

@@ -33,8 +33,8 @@ int check_step(const Arguments& a);
 /// `supertac-check picture`: writes every array between the signals of a recording at a time and the picture.
 int check_picture(const Arguments& a);
 
-/// `supertac-check ledgers`: the first step and array in which two ledgers differ and, with the recordings,
-/// the first operator and entry; or those of two opened steps.
+/// `supertac-check ledgers`: the first step and array in which two ledgers differ, or the first operator in
+/// which two opened steps do.
 int check_ledgers(const Arguments& a);
 
 }  // namespace supertac

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "apps/common/running/signals.h"
+#include "apps/train/run_folder.h"
 #include "apps/train/training_options.h"
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
@@ -36,10 +37,10 @@ TrainingTask task_of(const Arguments& a, const std::string& path) {
 
 }  // namespace
 
-Repetition::Repetition(const Arguments& a, const std::string& run_folder, const std::string& described_by)
-    : folder_(run_folder),
-      ledger_(Ledger::read(LedgerFile::path_in(run_folder))),
-      task_(task_of(a, described_by)) {
+Repetition::Repetition(const Arguments& a, const std::string& model)
+    : folder_(RunFolder::folder_of(model)),
+      ledger_(Ledger::read(LedgerFile::path_in(folder_))),
+      task_(task_of(a, model)) {
   trainer_.emplace(*task_.windows, task_.split.train, std::move(task_.objective));
 }
 

@@ -14,10 +14,9 @@ namespace supertac {
 /// A training with a ledger, made again from the states that it kept.
 class Repetition {
  public:
-  /// Of this run folder, as `described_by` (the model's file, or a kept state) says that it was trained.
-  /// Throws FileError when that does not say it, when there is no ledger, or when --data holds other
-  /// recordings.
-  Repetition(const Arguments& a, const std::string& run_folder, const std::string& described_by);
+  /// Of the model's run folder, as its file says that it was trained. Throws FileError when that does not say
+  /// it, when there is no ledger, or when --data holds other recordings.
+  Repetition(const Arguments& a, const std::string& model);
 
   struct Segment {
     std::int64_t from, to;

@@ -1,15 +1,12 @@
-// Trainings looked into: one step opened, and the first operator in which two of them part.
+// Trainings looked into: one step opened, and the first line or operator in which two of them part.
 #include <algorithm>
-#include <filesystem>
 
 #include "apps/check/check.h"
 #include "apps/check/repetition.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/progress.h"
-#include "apps/train/run_folder.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
-#include "io/numbers/numbers.h"
 #include "models/training/audit/opened_step.h"
 
 namespace supertac {
@@ -30,14 +27,10 @@ void write_arrays(const OutputPath& out, const std::map<std::string, Tensor>& ar
   write_safetensors(out, {{"kind", "operators"}, {"operators", operators.dump()}}, tensors);
 }
 
-// `of`: the training that they are of, where there are two.
-Json whose_name_begins(const Json& operators, const std::string& name, const char* of = nullptr) {
+Json whose_name_begins(const Json& operators, const std::string& name) {
   Json some = Json::array();
-  for (const Json& ran : operators) {
-    if (!ran["name"].get<std::string>().starts_with(name)) continue;
-    some.push_back(ran);
-    if (of != nullptr) some.back()["of"] = of;
-  }
+  for (const Json& ran : operators)
+    if (ran["name"].get<std::string>().starts_with(name)) some.push_back(ran);
   return some;
 }
 
@@ -52,80 +45,8 @@ std::optional<LedgerDifference> go_before(Repetition& training, std::int64_t ste
   return d;
 }
 
-// "entry [3,0,17]: 0.25 and 0.26".
-std::string entry_of(const Tensor& one, const Tensor& other) {
-  const std::optional<Dim> entry = first_different_entry(one, other);
-  if (!entry) return "shapes " + one.shape().text() + " and " + other.shape().text();
-  std::string index;
-  Dim rest = *entry;
-  for (int axis = one.rank() - 1; axis >= 0; rest /= one.dim(axis--))
-    index = std::to_string(rest % one.dim(axis)) + (index.empty() ? "" : ",") + index;
-  return "entry [" + index + "]: " + format(static_cast<double>(one.data()[*entry]), 9) + " and " +
-         format(static_cast<double>(other.data()[*entry]), 9);
-}
-
 Json to_json(const OperatorDifference& d) {
   return {{"operator", d.name}, {"op", d.op}, {"what", d.what}, {"one", d.one}, {"other", d.other}};
-}
-
-// Opens the steps in which the two ledgers part, one after the other in both trainings, until an operator
-// differs.
-int part(const Arguments& a, const LedgerDifference& lines, Json result) {
-  const auto folder = [&](const char* name) {
-    const std::filesystem::path file = a.text(name);
-    if (file.filename() != std::filesystem::path(LedgerFile::path_in("")).filename())
-      throw UsageError(a.text(name) + ": with --data expected the ledger in a run's own folder");
-    return file.has_parent_path() ? file.parent_path().string() : std::string(".");
-  };
-  const auto described = [&](const char* name) { return LedgerFile::state_path(folder(name), 0); };
-  Repetition one(a, folder("FILE"), described("FILE")), other(a, folder("OTHER"), described("OTHER"));
-  const auto say = [&](const std::string& text) {
-    a.print(text);
-    result["found"] = text;
-    a.write_json(result);
-    return kExitFailed;
-  };
-  for (std::int64_t step = lines.after + 1; step <= lines.step; ++step) {
-    OpenedStep opened[2];
-    const auto open = [&](std::size_t which, Repetition& training, const OpeningOptions& options) {
-      return training.make_step([&] { opened[which] = open_step(training.trainer(), options); });
-    };
-    if (step == lines.after + 1) {
-      if (const auto d = go_before(one, step, a))
-        return say(a.text("FILE") + " is not repeated here: " + text_of(*d));
-      if (const auto d = go_before(other, step, a))
-        return say(a.text("OTHER") + " is not repeated here: " + text_of(*d));
-    }
-    const auto of_one = open(0, one, {}), of_other = open(1, other, {});
-    const auto found = first_difference(opened[0].operators, opened[1].operators);
-    if (!found) {
-      if (of_one) a.print(a.text("FILE") + " comes out otherwise here: " + text_of(*of_one));
-      if (of_other) a.print(a.text("OTHER") + " comes out otherwise here: " + text_of(*of_other));
-      continue;
-    }
-    const Json operators[] = {opened[0].operators, opened[1].operators};
-    go_before(one, step, a), go_before(other, step, a);
-    open(0, one, {.keep = found->name}), open(1, other, {.keep = found->name});
-    opened[0].arrays.merge(opened[1].arrays);
-    const auto array = [&](const std::string& hash) { return opened[0].arrays.find(hash); };
-    const bool kept =
-        array(found->one) != opened[0].arrays.end() && array(found->other) != opened[0].arrays.end();
-    const std::string text = "step " + std::to_string(step) + ", " + found->name + ", " + found->what;
-    if (a.given("out")) {
-      Json both = whose_name_begins(operators[0], found->name, "one");
-      for (const Json& ran : whose_name_begins(operators[1], found->name, "other")) both.push_back(ran);
-      write_arrays(a.output("out"), opened[0].arrays, both);
-    }
-    result["step"] = step;
-    result["operator"] = to_json(*found);
-    return say(kept ? text + ", " + entry_of(array(found->one)->second, array(found->other)->second)
-                    : text + ": " + found->one + " and " + found->other);
-  }
-  return say(
-      "both trainings, repeated here from their states, are the same up to step " +
-      std::to_string(lines.step) +
-      ": one of them was computed otherwise where it ran; open this step there, too (supertac-check step), "
-      "and compare what comes out (supertac-check ledgers ONE.json OTHER.json)");
 }
 
 Json opened_in(const std::string& path) {
@@ -142,7 +63,7 @@ int check_step(const Arguments& a) {
   if (a.given("out") != a.given("operator"))
     throw UsageError("step: --operator says whose arrays --out holds; give both or neither");
   const std::string model = a.text("FILE");
-  Repetition training(a, RunFolder::folder_of(model), model);
+  Repetition training(a, model);
   Trainer& trainer = training.trainer();
   const std::int64_t step = a.integer("at", 1, trainer.total_steps());
   auto d = go_before(training, step, a);
@@ -189,9 +110,7 @@ int check_ledgers(const Arguments& a) {
   a.print(d ? text_of(*d)
             : "the same in " + std::to_string(both) + " lines" +
                   (one.lines.size() != two.lines.size() ? ", behind which one of them ends" : ""));
-  const Json result = {{"lines", both}, {"difference", d ? to_json(*d) : Json()}};
-  if (d && a.given("data")) return part(a, *d, result);
-  a.write_json(result);
+  a.write_json({{"lines", both}, {"difference", d ? to_json(*d) : Json()}});
   return d ? kExitFailed : kExitOk;
 }
 

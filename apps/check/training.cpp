@@ -5,7 +5,6 @@
 #include "apps/check/repetition.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/progress.h"
-#include "apps/train/run_folder.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
@@ -44,7 +43,7 @@ bool is_of(const std::string& model, const Network& network) {
 
 int check_training(const Arguments& a) {
   const std::string model = a.text("FILE");
-  Repetition training(a, RunFolder::folder_of(model), model);
+  Repetition training(a, model);
   Trainer& trainer = training.trainer();
   const std::vector<Segment> all = training.segments();
   const std::vector<Segment> chosen =

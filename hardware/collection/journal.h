@@ -86,7 +86,7 @@ struct Journal {
 /// there is none, or no header among them.
 Journal read_journal(const std::string& path);
 
-/// The same from bytes in memory; what the fuzzer calls.
+/// The same from bytes in memory.
 Journal parse_journal(std::span<const std::byte> bytes, const std::string& name);
 
 }  // namespace supertac

@@ -89,25 +89,6 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Li
   return legs;
 }
 
-std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const std::string& title) {
-  if (title.find_first_of("\r\n") != std::string::npos)
-    throw std::invalid_argument("palpation_program: the title has a line break, which would end its comment");
-  const std::vector<Leg> legs = legs_of(plan, origin, {});
-  std::string text =
-      "; " + title + "\n; Lengths in mm, F in mm/min. The finger is lifted before every way " +
-      "to another pass.\n; Send it only with the head at " + describe(origin) +
-      " and the plate below it. M0 waits for the " +
-      "operator: at the printer's\n; display; without one, but with an emergency parser, until " +
-      "the host sends M108; with neither, Marlin answers \"Unknown\n; command\" and goes on, " +
-      "and G4 leaves 20 s to switch it off.\nG21\nG90\nM0 Head at " + describe(origin) +
-      " and the plate below it?\nG4 S20\n" + origin_command(origin) + "\n";
-  for (const Leg& leg : legs) {
-    text += "; pass " + std::to_string(leg.pass) + ": " + name_of(leg.phase) + "\n" +
-            move_command(leg.to, leg.speed) + "\nM400\n";
-  }
-  return text;
-}
-
 Palpation::Palpation(Printer& printer, const PalpationPlan& plan, PalpationObserver observer)
     : printer_(printer), plan_(plan), observer_(std::move(observer)) {}
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -11,6 +12,8 @@ class Arguments;
 
 /// Whether stderr is a terminal that can be drawn on (not TERM=dumb).
 bool drawable_terminal();
+/// Its columns; 80 where it does not say.
+std::size_t terminal_width();
 
 /// How far a long work is, on stderr and not under --quiet. After its first seconds a line says how long the
 /// whole of it takes, where that is long. On a terminal (not TERM=dumb) a bar shows share done, rate and time

@@ -1,7 +1,6 @@
 #include "models/training/audit/opened_step.h"
 
 #include <array>
-#include <bit>
 #include <mutex>
 #include <stdexcept>
 #include <unordered_map>
@@ -303,13 +302,6 @@ OpenedStep open_step(Trainer& trainer, const OpeningOptions& options) {
   }));
   append(update.applied(report));
   return opened;
-}
-
-std::optional<Dim> first_different_entry(const Tensor& one, const Tensor& other) {
-  const auto bits = [](real x) { return std::bit_cast<std::array<std::byte, sizeof(real)>>(x); };
-  for (Dim i = 0; one.size() == other.size() && i < one.size(); ++i)
-    if (bits(one.data()[i]) != bits(other.data()[i])) return i;
-  return std::nullopt;
 }
 
 std::optional<OperatorDifference> first_difference(const Json& one, const Json& other) {

@@ -39,9 +39,6 @@ struct OpeningOptions {
 /// trains in several processes.
 OpenedStep open_step(Trainer& trainer, const OpeningOptions& options = {});
 
-/// The first entry whose bits differ; empty where none do, or the sizes differ.
-std::optional<Dim> first_different_entry(const Tensor& one, const Tensor& other);
-
 /// The first operator in which two openings of the same step differ.
 struct OperatorDifference {
   std::string name, op;

@@ -39,13 +39,13 @@ TEST_F(Outputs, TwoOfThemAreNeverOneFile) {
   for (const std::string other : {"old", "./old", "hard", "soft"})
     expect_exit(run("supertac-plate --plate plain --out old --force --json " + other), 2,
                 "would overwrite the output of --");
-  const auto fresh = run("supertac-plate --plate plain --out m --gcode ./m");
+  const auto fresh = run("supertac-plate --plate plain --out m --json ./m");
   EXPECT_EQ(fresh.code, 2) << "a name that does not exist yet";
   EXPECT_EQ(bytes("old"), "old");
 }
 
 TEST_F(Outputs, AnInputIsNeverOverwritten) {
-  succeed("supertac-plate --plate ridges6 --out mine.stl --resolution 5");
+  succeed("supertac-plate --plate ridges6 --out mine.stl");
   const std::string before = bytes("mine.stl");
   expect_exit(run("supertac-plate --plate mine.stl --out mine.stl --force"), 2,
               "would overwrite the input of --plate");
@@ -126,7 +126,7 @@ int shell(const std::string& line) {
 
 TEST_F(Descriptors, ClosedOnesGoToNobody) {
   const std::string out = path("x.stl");
-  EXPECT_EQ(shell("$BIN/supertac-plate --plate plain --resolution 5 --out " + out + " <&- >&- 2>&-"), 0);
+  EXPECT_EQ(shell("$BIN/supertac-plate --plate plain --out " + out + " <&- >&- 2>&-"), 0);
   const std::string stl = bytes("x.stl");
   EXPECT_FALSE(contains(stl, "triangles")) << "a message was written into the file";
   EXPECT_EQ((stl.size() - 84) % 50, 0U);
@@ -250,9 +250,9 @@ TEST_F(Import, HoldsOnePlateAtATime) {
 TEST_F(Outputs, InAFolderOfAPlatesNameReplaceNoInput) {
   fs::create_directory(path("bumps6"));
   write_file(path("bumps6/plate.stl"), std::string("old"));
-  EXPECT_EQ(shell("cd " + folder_.path() +
-                  " && $BIN/supertac-plate --plate bumps6 --resolution 5 --out bumps6/plate.stl --force"),
-            0);
+  EXPECT_EQ(
+      shell("cd " + folder_.path() + " && $BIN/supertac-plate --plate bumps6 --out bumps6/plate.stl --force"),
+      0);
 }
 
 }  // namespace

@@ -187,30 +187,15 @@ TEST_F(Audit, ALedgerThatWasChangedIsRefused) {
 TEST_F(Audit, TwoTrainingsPartAtAnOperator) {
   train("first.safetensors");
   train("second.safetensors", "--beta 0.002");
-  const std::string compare = "supertac-check ledgers first.run/ledger.jsonl second.run/ledger.jsonl";
-  const auto parted = run(compare + " --data data --out parted.safetensors");
-  EXPECT_EQ(parted.code, 1) << parted.error;
-  EXPECT_TRUE(std::regex_search(parted.out, std::regex("step 1, 0/[0-9]+\\.scale, the settings")))
-      << parted.out;
-  EXPECT_EQ(run(compare).code, 1);
+  EXPECT_EQ(run("supertac-check ledgers first.run/ledger.jsonl second.run/ledger.jsonl").code, 1);
 
   // The same step of both, each opened for itself.
   for (const std::string name : {"first", "second"})
     succeed("supertac-check step " + name + ".safetensors --data data --at 1 --json " + name + ".json");
   const auto opened = run("supertac-check ledgers first.json second.json");
   EXPECT_EQ(opened.code, 1);
-  EXPECT_TRUE(contains(opened.out, "scale, the settings"));
+  EXPECT_TRUE(std::regex_search(opened.out, std::regex("0/[0-9]+\\.scale, the settings"))) << opened.out;
   succeed("supertac-check ledgers first.json first.json");
-
-  // A training whose machine computed otherwise: from the states that it kept another line comes out here.
-  std::filesystem::copy(path("first.run"), path("faulty.run"), std::filesystem::copy_options::recursive);
-  std::filesystem::copy(path("second.run/ledger.jsonl"), path("faulty.run/ledger.jsonl"),
-                        std::filesystem::copy_options::overwrite_existing);
-  const auto faulty =
-      run("supertac-check ledgers first.run/ledger.jsonl faulty.run/ledger.jsonl --data data");
-  EXPECT_EQ(faulty.code, 1);
-  EXPECT_TRUE(contains(faulty.out, "faulty.run/ledger.jsonl comes out otherwise here"));
-  EXPECT_TRUE(contains(faulty.out, "open this step there, too"));
 }
 
 // Every operator of a step once more by NumPy, to the bit, and one of which a bit was changed.

@@ -63,7 +63,7 @@ class RoundTrips : public Training {
     write_file(to, parse_json_limited(read_text_file(from, kPlenty)).dump(2) + "\n");
   }
 
-  // A pass as the rig's authors wrote them, imported with pictures and a page.
+  // A pass as the rig's authors wrote them, imported.
   static void import_texts() {
     const Recording pass = read_recording(path("data/3_Bumps_t1_p1_v10.safetensors"));
     std::string text;
@@ -71,7 +71,7 @@ class RoundTrips : public Training {
       text += std::to_string(pass.volts[i]) + (i % 16 == 15 ? '\n' : ' ');
     fs::create_directories(path("text/3_Bumps/1"));
     write_file(path("text/3_Bumps/1/1.txt"), text);
-    succeed("supertac-import text --out imported --pictures fits");
+    succeed("supertac-import text --out imported");
     fs::remove_all(path("text"));
   }
 
@@ -132,8 +132,7 @@ class RoundTrips : public Training {
 TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
   const std::string of_pass = " --recording data/3_Bumps_t1_p1_v10.safetensors ";
   trained("m.safetensors", "--ledger 1000 --json train.json");
-  succeed(
-      "supertac-plate --plate bumps6 --resolution 2 --out plate.stl --gcode plate.gcode --json plate.json");
+  succeed("supertac-plate --plate bumps6 --out plate.stl --json plate.json");
   succeed(
       "supertac-evaluate --model m.safetensors --data data --limit 30 --outputs outputs.safetensors "
       "--pictures pictures --report report.html --json evaluate.json");
@@ -155,7 +154,7 @@ TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
   collect_and_probe();
 
   // Those that are for people and other programs are not read by ours.
-  const std::set<std::string> not_read = {".html", ".png", ".gcode", ".onnx", ".csv", ".h", ".c"};
+  const std::set<std::string> not_read = {".html", ".png", ".onnx", ".csv", ".h", ".c"};
   const std::map<std::string, std::function<void(const std::string&, const std::string&)>> again = {
       {".safetensors", safetensors},
       {".stl", stl},

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <sstream>
 
 #include "hardware/printers/palpation.h"
 #include "tests/expect_error.h"
@@ -111,46 +110,6 @@ TEST(RealMarlin, AStopWhileItHomesStopsTheHead) {
     EXPECT_THROW(bench.printer.home(), OperatorStop);
     EXPECT_LT(bench.rig.now() - begin, 5.7);
     EXPECT_FALSE(bench.firmware().moving(bench.rig.now()));
-  }
-}
-
-/// Sends the program as a simple host does: line by line, each after the ok of the one before.
-struct ProgramRun {
-  explicit ProgramRun(bool parser, bool display = false)
-      : rig(running_rig({.emergency_parser = parser, .display = display})), port(rig.printer_port()) {
-    std::istringstream lines(palpation_program({.passes = 1}, rig::kMounted, "x"));
-    for (std::string line; std::getline(lines, line);) {
-      if (line.starts_with(';')) continue;
-      line += '\n';
-      port->write(std::as_bytes(std::span(line)), port->now() + 1);
-      if (!answered(line.starts_with("M0") || line.starts_with("G4") ? 15 : 200)) {
-        waits_in = line;
-        return;
-      }
-    }
-  }
-  bool answered(double seconds) {
-    std::string got;
-    const double until = port->now() + seconds;
-    while (port->now() < until) {
-      std::array<std::byte, 256> buffer{};
-      const Received received = port->read(buffer, until);
-      got.append(reinterpret_cast<const char*>(buffer.data()), received.count);
-      if (got.find("\nok") != std::string::npos || got.starts_with("ok")) return true;
-    }
-    return false;
-  }
-  SimulatedRig rig;
-  std::unique_ptr<Port> port;
-  std::string waits_in;
-};
-
-TEST(RealMarlin, TheProgramPausesOnEveryFirmware) {
-  for (const auto& [parser, display] :
-       {std::pair{true, false}, {true, true}, {false, true}, {false, false}}) {
-    ProgramRun run(parser, display);
-    EXPECT_FALSE(run.waits_in.empty()) << "parser " << parser << ", display " << display;
-    EXPECT_TRUE(moves_of(run.rig.world().printer()).empty()) << "moved within 15 s";
   }
 }
 

@@ -66,6 +66,13 @@ Tensor in_another_order(const TracedOp& op) {
   return y;
 }
 
+std::optional<Dim> first_different_entry(const Tensor& one, const Tensor& other) {
+  for (Dim i = 0; one.size() == other.size() && i < one.size(); ++i)
+    if (std::bit_cast<std::uint32_t>(one.data()[i]) != std::bit_cast<std::uint32_t>(other.data()[i]))
+      return i;
+  return std::nullopt;
+}
+
 using Keep = std::optional<std::string>;
 
 class OpenedSteps : public testing::Test {
