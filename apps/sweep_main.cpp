@@ -131,9 +131,9 @@ std::vector<Recipe> grid_of(const Arguments& a) {
 // Figures that cannot be compared do not mix: whatever a table's rows have in common has to stay.
 void check_settings(const Arguments& a) {
   const std::string path = a.text("out") + "/settings.json";
-  const std::string now =
-      Json{{"command", a.deciding_options()}, {"data", hash_of_recordings(a.text("data"), a.list("plates"))}}
-          .dump();
+  const Json settings = {{"command", a.deciding_options()},
+                         {"data", hash_of_recordings(a.text("data"), a.list("plates"))}};
+  const std::string now = settings.dump(2) + "\n";
   if (!fs::exists(path)) return write_file(path, now);
   const std::string before = read_text_file(path, 1 << 20);
   if (before != now)
