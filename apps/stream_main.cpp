@@ -92,8 +92,6 @@ void declare(Arguments& a) {
           "plate with one element in its middle")
       .option("record", "DIR", "keep the signals as a recording in this folder, the next pass of its plate")
       .option("plate", "NAME", "what the recording slides over: a plate's name, or an STL file", "unknown")
-      .option("udp", "HOST:PORT",
-              "send a datagram of JSON for each picture, e.g. to PlotJuggler at 127.0.0.1:9870")
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
       .writes()
       .option("classifier", "FILE",
@@ -193,7 +191,6 @@ int run(Arguments& a) {
                           .record = a.text("record"),
                           .plate = a.text("plate"),
                           .map = a.output("map"),
-                          .udp = a.text("udp"),
                           .view = !a.quiet() && drawable_terminal()};
   if (probed) settings.found = probed->says;
   if (a.given("seconds") && !probed) settings.seconds = a.number("seconds", 0.001, 1e9);

@@ -61,7 +61,6 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   if (maker_ && (settings.web || !settings.map.path.empty()))
     map_.emplace(maker_->image(), models.front().model->settings().timesteps > 1);
   about_lines_ = about_lines(source.array(), source.signal_scale().unit, format.image);
-  if (!settings.udp.empty()) udp_ = std::make_unique<UdpOutput>(settings.udp);
   if (!settings.classifier.empty()) {
     classifier_ = load_classifier(settings.classifier);
     const ImageGrid image = maker_->image();
@@ -132,8 +131,7 @@ void Stream::finish(const std::string& failure) {
 }
 
 void Stream::complete() {
-  lines_lost_ = (udp_ ? udp_->lost() : 0) + (pipe_ ? pipe_->lost() : 0);
-  udp_.reset();
+  lines_lost_ = pipe_ ? pipe_->lost() : 0;
   pipe_.reset();
   std::exception_ptr first;  // what goes wrong with one file is no reason to lose another
   const auto attempt = [&first](const auto& work) {
@@ -227,7 +225,7 @@ nlohmann::ordered_json Stream::result() const {
 bool Stream::take(SensorFrame frame) {
   if (frames_ == 0) first_s_ = frame.time_s, begin_s_ = monotonic_seconds();
   if (frame.time_s - first_s_ >= settings_.seconds) return false;
-  if ((view_ || web_ || udp_) && !source_.live()) frame.arrived_s = keep_pace(frame.time_s);
+  if ((view_ || web_) && !source_.live()) frame.arrived_s = keep_pace(frame.time_s);
   if (source_.live()) {
     // One offset for all frames, however the system's clock is set meanwhile; only a sensor that begins anew
     // has another.
@@ -274,11 +272,9 @@ void Stream::keep_raw(const SensorFrame& frame) {
 void Stream::output(const Seen& seen) {
   if (log_) log_->add(seen);
   if (mcap_) mcap_->add(seen.time_s, seen.wall_s, seen.volts, seen.picture, seen.half_widths);
-  if (!udp_ && !pipe_) return;
+  if (!pipe_) return;
   const FrameLoad load = load_of(seen.volts, source_.array().channels, source_.signal_scale());
-  std::string line = picture_line(seen, load, state_.unlike_training, about_lines_);
-  if (udp_) udp_->send(line);
-  if (pipe_) pipe_->send(std::move(line));
+  pipe_->send(picture_line(seen, load, state_.unlike_training, about_lines_));
 }
 
 void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {

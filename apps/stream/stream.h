@@ -32,7 +32,6 @@ struct StreamSettings {
   std::string plate = "unknown";        ///< of the recording: a plate's name or an STL file
   OutputPath map = "";                  ///< file of the surface that was felt; empty: none
   std::optional<Plate> elements = {};   ///< the kind that the map's elements are drawn as, where it is known
-  std::string udp = {};                 ///< HOST:PORT that gets a line for each; empty: none
   bool view = false;                    ///< draw on the terminal
   std::optional<WebAddress> web = {};   ///< serve the live page
   std::string badge = {}, source = {};  ///< for the page: what is streamed
@@ -96,7 +95,6 @@ class Stream {
   std::unique_ptr<PictureLog> log_, record_;
   std::unique_ptr<McapLog> mcap_;
   std::unique_ptr<TerminalView> view_;
-  std::unique_ptr<UdpOutput> udp_;
   std::unique_ptr<PipeOutput> pipe_;
   std::unique_ptr<Recorder> recorder_;  // at the page's wish
   std::unique_ptr<WebView> web_;

@@ -66,19 +66,14 @@ class Device:
 
 
 class Pictures(threading.Thread):
-    """Takes the datagrams: of each its number and time, of every hundredth also what it shows."""
-    def __init__(self):
+    """Takes the lines: of each its number and time, of every hundredth also what it shows."""
+    def __init__(self, lines):
         super().__init__(daemon=True)
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 8 << 20)
-        self.socket.bind(("127.0.0.1", 0))
-        self.port = self.socket.getsockname()[1]
-        self.came = {}
+        self.lines, self.came = lines, {}
         self.start()
 
     def run(self):
-        while True:
-            line = self.socket.recv(1 << 17)
+        for line in self.lines:
             now = time.monotonic()
             number = int(re.search(rb'"number":(\d+)', line[:400])[1])
             self.came[number] = (now, line if number % 100 == 0 else None)
@@ -107,9 +102,9 @@ def study(stream, device, kind, seconds, folder):
                 data = data[os.write(out, data):]
     sensor = folder / f"{kind}.json"
     sensor.write_text(json.dumps(device.describe(port)))
-    pictures, told = Pictures(), folder / f"{kind}_told.json"
-    program = subprocess.Popen([stream, "--sensor", sensor, "--udp", f"127.0.0.1:{pictures.port}", "--json", told, "--quiet"],
-                               stdout=subprocess.DEVNULL)
+    told = folder / f"{kind}_told.json"
+    program = subprocess.Popen([stream, "--sensor", sensor, "--out", "-", "--json", told, "--quiet"], stdout=subprocess.PIPE)
+    pictures = Pictures(program.stdout)
     time.sleep(1)
     sender = threading.Thread(target=device.run, args=(send, seconds))
     sender.start()

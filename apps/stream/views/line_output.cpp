@@ -1,8 +1,6 @@
 #include "apps/stream/views/line_output.h"
 
-#include <fcntl.h>
 #include <poll.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,10 +12,8 @@
 
 #include "apps/common/running/signals.h"
 #include "data/sensors/sensor.h"
-#include "hardware/ports/host_addresses.h"
 #include "hardware/ports/serial_port.h"
 #include "io/numbers/numbers.h"
-#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -73,36 +69,6 @@ std::string about_lines(const TaxelArray& array, const std::string& unit, const 
                 {"unit", unit}});
   const std::string text = about.dump();
   return text.substr(1, text.size() - 2);
-}
-
-UdpOutput::UdpOutput(const std::string& address) {
-  const std::size_t colon = address.rfind(':');
-  const std::string host = address.substr(0, colon),
-                    port = colon < address.size() ? address.substr(colon + 1) : "";
-  const auto number = parse_uint(port);
-  if (host.empty() || !number || *number < 1 || *number > 65535)
-    throw std::runtime_error("--udp: expected HOST:PORT, such as 127.0.0.1:9870, found " +
-                             in_quotes(address));
-  const HostAddresses found =
-      host_addresses("--udp: " + in_quotes(host), host, static_cast<int>(*number), SOCK_DGRAM);
-  socket_ = socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const bool connected = socket_ >= 0 && connect(socket_, found->ai_addr, found->ai_addrlen) == 0;
-  if (connected) return;
-  const std::string why = printable(std::generic_category().message(errno));
-  if (socket_ >= 0) close(socket_);
-  throw std::runtime_error("--udp: " + in_quotes(address) + ": " + why);
-}
-
-UdpOutput::~UdpOutput() { close(socket_); }
-
-// A refused one tells that nobody listened to the datagram before: somebody may by now.
-void UdpOutput::send(const std::string& line) {
-  const auto sent = [&] { return ::send(socket_, line.data(), line.size(), MSG_NOSIGNAL) >= 0; };
-  if (sent() || (errno == ECONNREFUSED && sent())) return;
-  if (errno == EMSGSIZE)
-    throw std::runtime_error("--udp: a line has " + std::to_string(line.size()) +
-                             " bytes, a datagram carries at most 65507; take the lines of --out - instead");
-  ++lost_;
 }
 
 PipeOutput::PipeOutput(int file, bool patient) : file_(file), patient_(patient), thread_([this] { run(); }) {}

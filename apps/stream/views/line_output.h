@@ -15,30 +15,12 @@ namespace supertac {
 /// {"timestamp":s,"wall_s":s,"number":n,ABOUT,"total_force":f,"saturated":n,"volts":[...],"picture":[...]}
 /// with the numbers of Seen and its load, four decimals of what is felt and drawn, and a line feed; without a
 /// model no "picture"; of one that says how sure it is also "half_width", the mean over the pixels,
-/// "distance" and "unlike_training", 0 or 1. "wall_s" only where it is known. PlotJuggler (JSON over UDP,
-/// field "timestamp" as time) makes a curve of every number.
+/// "distance" and "unlike_training", 0 or 1. "wall_s" only where it is known.
 std::string picture_line(const Seen& seen, const FrameLoad& load, bool unlike_training,
                          const std::string& about);
 /// What all lines of a stream have in common:
 /// "height":16,"width":16,"pixel_mm":0.75,"rows":4,"columns":4,"channels":1,"pitch_mm":3,"unit":"V".
 std::string about_lines(const TaxelArray& array, const std::string& unit, const ImageGrid& image);
-
-/// Sends each line as a datagram; one that does not fit into the socket's buffer is lost.
-class UdpOutput {
- public:
-  /// "HOST:PORT". Throws std::runtime_error when it is not, or the host is unknown.
-  explicit UdpOutput(const std::string& address);
-  ~UdpOutput();
-  UdpOutput(const UdpOutput&) = delete;
-  UdpOutput& operator=(const UdpOutput&) = delete;
-  /// Never waits.
-  void send(const std::string& line);
-  std::uint64_t lost() const { return lost_; }
-
- private:
-  int socket_ = -1;
-  std::uint64_t lost_ = 0;
-};
 
 /// Writes lines to a pipe from a thread of its own. At most kWaiting lines wait for a reader that is slow;
 /// more are lost.

@@ -192,7 +192,7 @@ def command_of(phase, programs, folder, network):
         return sensor_command(phase, programs, folder, network)
     stream = [f"{programs}/supertac-stream", "--speedup", str(SPEEDUP), "--board"]
     every = ["--capture", f"{folder}/capture", "--record", f"{folder}/kept", "--out", f"{folder}/seen", "--json", f"{folder}/json",
-             "--web", "0", "--udp", "127.0.0.1:9"]
+             "--web", "0"]
     collect = [f"{programs}/supertac-collect", "--board", f"{folder}/board", "--printer", f"{folder}/printer", "--plate",
                "6_Ridges", "--passes", "1", "--out", f"{folder}/out", "--speedup", str(SPEEDUP)]
     return {"question": collect, "homing": [*collect, "--yes", "--home"],

@@ -1,12 +1,8 @@
-// Pictures for other programs: each line and datagram is parsed as its reader would, and who does not read
-// costs nothing.
+// Pictures for other programs: each line is parsed as its reader would, and who does not read costs nothing.
 #include "apps/stream/views/line_output.h"
 
-#include <arpa/inet.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -61,46 +57,6 @@ TEST(PictureLine, HoldsWhatIsKnownAndNothingElse) {
   const std::vector<float> strange(16, std::nanf(""));
   one.volts = strange;
   EXPECT_TRUE(parse_json_limited(picture_line(one, {}, true, about))["volts"][0].is_null());
-}
-
-// What PlotJuggler's JSON parser takes: one object a datagram, "timestamp" a number, all else numbers,
-// objects or arrays of them, which it flattens, or texts, of which it makes no curve.
-TEST(UdpOutput, EveryDatagramIsWhatPlotJugglerTakesAndNoneIsLost) {
-  const int receiver = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  sockaddr_in place{};
-  place.sin_family = AF_INET;
-  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof place;
-  ASSERT_EQ(bind(receiver, reinterpret_cast<sockaddr*>(&place), size), 0);
-  getsockname(receiver, reinterpret_cast<sockaddr*>(&place), &size);
-  UdpOutput output("127.0.0.1:" + std::to_string(ntohs(place.sin_port)));
-  char buffer[65536];
-  for (std::uint64_t i = 0; i < 1008; ++i) {
-    output.send(picture_line(seen(i), {}, false, kAbout));
-    const ssize_t count = recv(receiver, buffer, sizeof buffer, 0);
-    ASSERT_GT(count, 0);
-    const auto json = parse_json_limited({buffer, static_cast<std::size_t>(count)});
-    ASSERT_EQ(json["number"], i);
-    ASSERT_TRUE(json["timestamp"].is_number());
-    for (const auto& [name, value] : json.items())
-      for (const auto& part : value.is_array() ? value : nlohmann::ordered_json::array({value}))
-        ASSERT_TRUE(part.is_number() || name == "unit") << name;
-  }
-  EXPECT_EQ(output.lost(), 0U);
-  close(receiver);
-  for (int i = 0; i < 10; ++i) output.send("nobody listens\n");  // and nothing happens
-}
-
-TEST(UdpOutput, AnAddressThatIsNoneIsNamed) {
-  for (const char* address :
-       {"", "127.0.0.1", "127.0.0.1:", ":9870", "127.0.0.1:0", "127.0.0.1:65536", "[::1]"}) {
-    try {
-      const UdpOutput output(address);
-      FAIL() << address;
-    } catch (const std::runtime_error& error) {
-      EXPECT_NE(std::string(error.what()).find("expected HOST:PORT"), std::string::npos) << error.what();
-    }
-  }
 }
 
 class Pipe : public testing::Test {
