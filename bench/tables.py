@@ -139,12 +139,12 @@ def maps():
 
 def shown_elements():
     found, lines = rows("accuracy/elements.csv"), []
-    for network, trial in (("paper", "2"), ("without the plate", "1"), ("without the plate", "2")):
+    names = {"paper": "knows it", "without the plate": "knows three others", "random plates beside": "and random plates"}
+    for network, trial in [("paper", "2"), *((n, t) for t in "12" for n in list(names)[1:])]:
         for plate in [*dict.fromkeys(r["plate"] for r in found), "all"]:
             of = [r for r in chosen(found, network=network, trial=trial, map_of="plate") if plate in ("all", r["plate"])]
             total = {key: sum(int(r[key]) for r in of) for key in ("existing", "found", "false")}
-            known = "five networks" if network == "paper" else "left out"
-            lines.append([plate, known, trial, f"{total['found']} of {total['existing']}", str(total["false"]),
+            lines.append([plate, names[network], trial, f"{total['found']} of {total['existing']}", str(total["false"]),
                           *(f"{mean(of, c):.2f}" if any(r[c] for r in of) else "" for c in ("median_mm", "pitch_error_mm")),
                           *(f"{mean(of, c):.3f}" for c in ("ssim", "stated_ssim"))])
     return table(["plate", "network", "trial", "found", "false", "off by mm", "pitch off by mm", "SSIM", "SSIM, kind stated"], lines)

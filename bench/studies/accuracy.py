@@ -25,6 +25,7 @@ KNOWN = ("3_Bumps", "6_Bumps", "4_Ridges", "6_Ridges")
 PLATES = (*KNOWN, "4_Blob", "6_Blob", "4_Waves", "6_Waves")
 PRESETS = ("paper", "tiny")
 RANDOM = ["--preset", "tiny", "--latent", "20", "--stride", "4", "--epochs", "12", "--random-plates", "1500"]
+FEWER = [*RANDOM[:-3], "10", "--random-plates", "800"]  # a minute and a half
 FIGURES = {"contact_ssim": ("contact", "ssim"), "contact_psnr_db": ("contact", "psnr_mean_db"),
            "position_error_mm": ("contact", "position_error_mm"), "miss_rate": ("contact", "miss_rate"),
            "flat_ghost_rate": ("flat", "ghost_rate"), "coverage": ("trust", "coverage")}
@@ -159,8 +160,11 @@ def elements(study):
         for seed in study.seeds:
             score("paper", seed, study.trained_apart(f"apart_s{seed}", KNOWN, seed), plate, 2)
         model = study.trained_apart(f"apart_without_{plate}", [p for p in KNOWN if p != plate], 0)
+        beside = study.train(f"beside_without_{plate}", study.first, *FEWER, "--split", "texture", "--leave-out", plate,
+                             "--plates", ",".join(KNOWN))
         for trial in (1, 2):
             score("without the plate", 0, model, plate, trial)
+            score("random plates beside", 0, beside, plate, trial)
     write(study.out / "elements.csv", lines)
 
 

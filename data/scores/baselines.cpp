@@ -36,7 +36,7 @@ double keys_kernel(double distance) {
 }
 
 // Of the taxels of a line on its pixels, [pixels][taxels].
-std::vector<float> weights_of(Upsampling::Kind kind, int taxels, int scale) {
+std::vector<float> weights_of(int taxels, int scale) {
   std::vector<float> weights(static_cast<std::size_t>(taxels) * static_cast<std::size_t>(taxels) *
                              static_cast<std::size_t>(scale));
   for (int p = 0; p < taxels * scale; ++p) {
@@ -44,12 +44,8 @@ std::vector<float> weights_of(Upsampling::Kind kind, int taxels, int scale) {
     const int left = static_cast<int>(std::floor(u));
     float* row = &weights[static_cast<std::size_t>(p) * static_cast<std::size_t>(taxels)];
     const auto inside = [&](int taxel) { return static_cast<std::size_t>(std::clamp(taxel, 0, taxels - 1)); };
-    if (kind == Upsampling::Kind::nearest) {
-      row[inside(static_cast<int>(std::floor(u + 0.5)))] = 1;
-    } else {
-      for (int taxel = left - 1; taxel <= left + 2; ++taxel)
-        row[inside(taxel)] += static_cast<float>(keys_kernel(u - taxel));
-    }
+    for (int taxel = left - 1; taxel <= left + 2; ++taxel)
+      row[inside(taxel)] += static_cast<float>(keys_kernel(u - taxel));
   }
   return weights;
 }
@@ -75,18 +71,18 @@ void MeanImage::predict(std::span<const float> input, std::span<float> out) cons
   std::copy(image_.begin(), image_.end(), out.begin());
 }
 
-Upsampling::Upsampling(Kind kind, int rows, int columns, int scale) {
+Bicubic::Bicubic(int rows, int columns, int scale) {
   if (rows < 1 || columns < 1 || scale < 1)
-    throw std::invalid_argument("upsampling: rows, columns and scale must be at least 1, got " +
+    throw std::invalid_argument("bicubic: rows, columns and scale must be at least 1, got " +
                                 std::to_string(rows) + ", " + std::to_string(columns) + " and " +
                                 std::to_string(scale));
   rows_ = static_cast<std::size_t>(rows);
   columns_ = static_cast<std::size_t>(columns);
-  down_ = weights_of(kind, rows, scale);
-  across_ = weights_of(kind, columns, scale);
+  down_ = weights_of(rows, scale);
+  across_ = weights_of(columns, scale);
 }
 
-void Upsampling::operator()(std::span<const float> frame, std::span<float> out) const {
+void Bicubic::operator()(std::span<const float> frame, std::span<float> out) const {
   const std::size_t height = down_.size() / rows_, width = across_.size() / columns_;
   check_size("a frame", frame.size(), rows_ * columns_);
   check_size("the image", out.size(), height * width);
@@ -103,9 +99,8 @@ void Upsampling::operator()(std::span<const float> frame, std::span<float> out) 
   }
 }
 
-UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows,
-                               std::span<const std::uint32_t> train)
-    : kind_(kind), array_(windows.array()), upsampling_(kind, array_.rows, array_.columns, windows.scale()) {
+UpsampledFrame::UpsampledFrame(const WindowSet& windows, std::span<const std::uint32_t> train)
+    : array_(windows.array()), upsampling_(array_.rows, array_.columns, windows.scale()) {
   const std::size_t pixels = windows.image().pixels();
   std::vector<float> image(pixels), truth(pixels);
   double sx = 0, sy = 0, sxx = 0, sxy = 0;
@@ -128,10 +123,6 @@ UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows,
   intercept_ = (sy - slope_ * sx) / n;
 }
 
-std::string UpsampledFrame::name() const {
-  return kind_ == Upsampling::Kind::nearest ? "nearest" : "bicubic";
-}
-
 void UpsampledFrame::predict(std::span<const float> input, std::span<float> out) const {
   check_input(input, array_);
   upsampling_(mean_of_channels(array_, input.last(array_.signals())), out);
@@ -142,8 +133,7 @@ Baselines fit_baselines(const WindowSet& windows, std::span<const std::uint32_t>
                         const FitProgress& progress) {
   Baselines baselines;
   baselines.push_back(std::make_unique<MeanImage>(windows, train));
-  for (const auto kind : {Upsampling::Kind::nearest, Upsampling::Kind::bicubic})
-    baselines.push_back(std::make_unique<UpsampledFrame>(kind, windows, train));
+  baselines.push_back(std::make_unique<UpsampledFrame>(windows, train));
   baselines.push_back(std::make_unique<Ridge>(windows, train, progress));
   return baselines;
 }

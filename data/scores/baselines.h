@@ -35,16 +35,14 @@ class MeanImage : public Baseline {
   std::vector<float> image_;
 };
 
-/// Enlarges a frame of rows x columns taxels by a whole factor. Taxels lie in the middle of equal cells,
-/// which the pixels divide, so pixel p of a row lies at u = (p + 1/2) / scale - 1/2 in units of taxels.
-/// Taxels beyond the edge repeat the outermost.
-///   nearest  the taxel at round(u)
-///   bicubic  cubic convolution (Keys 1981, a = -1/2, also called Catmull-Rom) along both axes
-class Upsampling {
+/// Enlarges a frame of rows x columns taxels by a whole factor, by cubic convolution (Keys 1981, a = -1/2,
+/// also called Catmull-Rom) along both axes. Taxels lie in the middle of equal cells, which the pixels
+/// divide, so pixel p of a row lies at u = (p + 1/2) / scale - 1/2 in units of taxels. Taxels beyond the edge
+/// repeat the outermost.
+class Bicubic {
  public:
-  enum class Kind { nearest, bicubic };
   /// Throws std::invalid_argument when a size is below 1.
-  Upsampling(Kind kind, int rows, int columns, int scale);
+  Bicubic(int rows, int columns, int scale);
   /// frame [rows][columns], out [rows * scale][columns * scale]. Throws std::invalid_argument on other
   /// sizes.
   void operator()(std::span<const float> frame, std::span<float> out) const;
@@ -54,22 +52,21 @@ class Upsampling {
   std::vector<float> down_, across_;  // [pixels][taxels]: weights of the taxels of a line on its pixels
 };
 
-/// Upsampling of the last frame (the mean of each taxel's channels), followed by a x + b: the line that fits
-/// the targets of the training examples best (least squares over all pixels). It turns voltage into height as
-/// well as two numbers can.
+/// Bicubic interpolation of the last frame (the mean of each taxel's channels), followed by a x + b: the line
+/// that fits the targets of the training examples best (least squares over all pixels). It turns voltage into
+/// height as well as two numbers can.
 class UpsampledFrame : public Baseline {
  public:
   /// Throws std::invalid_argument when train is empty.
-  UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows, std::span<const std::uint32_t> train);
-  std::string name() const override;
+  UpsampledFrame(const WindowSet& windows, std::span<const std::uint32_t> train);
+  std::string name() const override { return "bicubic"; }
   void predict(std::span<const float> input, std::span<float> out) const override;
   double slope() const { return slope_; }
   double intercept() const { return intercept_; }
 
  private:
-  Upsampling::Kind kind_;
   TaxelArray array_;
-  Upsampling upsampling_;
+  Bicubic upsampling_;
   double slope_ = 0, intercept_ = 0;
 };
 
@@ -78,7 +75,7 @@ using Baselines = std::vector<std::unique_ptr<Baseline>>;
 /// Told how much of `all` is done, some times a second; may throw to end the fit.
 using FitProgress = std::function<void(std::size_t done, std::size_t all)>;
 
-/// mean_image, nearest, bicubic and ridge (data/scores/ridge.h), in this order. Each is fitted to at most
+/// mean_image, bicubic and ridge (data/scores/ridge.h), in this order. Each is fitted to at most
 /// kFitWindows training examples, evenly spread over the list. Throws std::invalid_argument when train is
 /// empty.
 constexpr std::size_t kFitWindows = 20000;

@@ -23,7 +23,7 @@ TEST(Ridge, UsesWhatTheWindowHoldsBetterThanTheLastFrame) {
   const Ridge ridge(set, split.train);
   EXPECT_EQ(ridge.name(), "ridge");
   EXPECT_LT(mean_error(set, split.test, ridge),
-            0.5 * mean_error(set, split.test, UpsampledFrame(Upsampling::Kind::bicubic, set, split.train)));
+            0.5 * mean_error(set, split.test, UpsampledFrame(set, split.train)));
 }
 
 TEST(Ridge, SaysHowFarItIsAndCanBeEnded) {
