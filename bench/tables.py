@@ -143,6 +143,8 @@ def shown_elements():
     for network, trial in [("paper", "2"), *((n, t) for t in "12" for n in list(names)[1:])]:
         for plate in [*dict.fromkeys(r["plate"] for r in found), "all"]:
             of = [r for r in chosen(found, network=network, trial=trial, map_of="plate") if plate in ("all", r["plate"])]
+            if not of:
+                continue
             total = {key: sum(int(r[key]) for r in of) for key in ("existing", "found", "false")}
             lines.append([plate, names[network], trial, f"{total['found']} of {total['existing']}", str(total["false"]),
                           *(f"{mean(of, c):.2f}" if any(r[c] for r in of) else "" for c in ("median_mm", "pitch_error_mm")),
