@@ -171,16 +171,20 @@ std::vector<std::string> classes_of(const WindowSet& windows) {
 // Both sides of the split that the model was trained with, so that neither model nor classifier has seen
 // the tested windows; trained on is every stride-th window in contact. Throws std::runtime_error when that
 // split cannot be repeated on these windows.
-Dataset make_dataset(const WindowSet& windows, const Candidate& model,
+Dataset make_dataset(const WindowSet& windows, const std::string& folder, const Candidate& model,
                      const std::vector<std::string>& classes, std::int64_t stride) {
   std::vector<std::uint32_t> held_out;
   Split split = split_of(windows, model.recipe, held_out);
-  // Trials are what they are; other splits are drawn from the windows there are.
-  if (model.recipe.split != SplitKind::trial &&
-      fingerprint(split) != value_or(model.file.metadata, "split_fingerprint"))
-    throw std::runtime_error(model.path +
-                             ": its split cannot be repeated on this data, and it may have seen the test "
-                             "windows; give the recordings and plates it was trained on");
+  // Trials are what they are; other splits are drawn from the windows there are. A training has more windows
+  // than these, in which nothing is felt.
+  if (model.recipe.split != SplitKind::trial) {
+    const TrainingTask task = window_task(model.recipe, {.data = folder});
+    if (task.split.test != split.test ||
+        task.origin.at("split_fingerprint") != value_or(model.file.metadata, "split_fingerprint"))
+      throw std::runtime_error(model.path +
+                               ": its split cannot be repeated on this data, and it may have seen the test "
+                               "windows; give the recordings and plates it was trained on");
+  }
   Dataset data;
   for (const WindowSet::Pass& pass : windows.passes())
     data.label_of_pass.push_back(
@@ -366,7 +370,8 @@ int run(Arguments& a) {
       WindowSet::load(a.text("data"), a.given("plates") ? a.list("plates") : first.recipe.plates, taken);
   const std::vector<std::string> classes = classes_of(windows);
   std::vector<Dataset> data;
-  for (const Candidate& model : models) data.push_back(make_dataset(windows, model, classes, stride));
+  for (const Candidate& model : models)
+    data.push_back(make_dataset(windows, a.text("data"), model, classes, stride));
   const std::string split = name_of(first.recipe.split);
   a.note("split " + split + ": " + std::to_string(data.front().train.size()) + " training windows, " +
          std::to_string(data.front().test.size()) + " test windows");

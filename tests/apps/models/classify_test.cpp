@@ -17,7 +17,7 @@ class Classify : public OnSimulatedData {
     for (const std::string split : {"trial", "none", "pass"})
       succeed(
           "supertac-train --data data --timesteps 32 --latent 3 --rate 300 --stride 16 --epochs 1 --out " +
-          split + " --split " + split + (split == "pass" ? " --augment none" : ""));
+          split + " --split " + split);
   }
 };
 
