@@ -3,36 +3,51 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <span>
 
-#include "data/clock/frame_clock.h"
+namespace supertac {
 
-namespace supertac::clock_model {
+/// Reads that brought the frames up to the number `last`, as an envelope sees them.
+struct ReadEnd {
+  double first = 0, last = 0, time_s = 0;
+  double gap_s = 0, slack_s = 0;  ///< since the read before; by how much `last` may be too large
+};
+struct Rate {
+  double period_s = 0;
+  double uncertain = 0;  ///< a share: how far off the period may be
+};
+
+/// How late the reads of a stream come.
+struct Lateness {
+  double jitter_s = 0;  ///< one in ten is later, of these one in ten later than twice that, and so on
+  double waited_s = 0;  ///< so long at most a frame waits that the read in front of it did not take
+  bool known = false;
+};
+
+namespace clock_model {
 
 // The assumptions of the header.
 constexpr std::size_t kReads = 16;
 constexpr double kReadsS = 0.25, kSteady = 2e-4;
-constexpr double kLateShare = 0.9, kDecades = 13;
+constexpr double kLateShare = 0.9, kDecades = 13, kChance = 3;
 constexpr double kOldestS = 0.6;  // a frame waited no longer before anything is known; stamps jump no farther
 constexpr double kAnyRate = 20;   // of a rate that is a word
-constexpr double kWholePeriod = 0.55;  // what is late by less may be late alone
 constexpr double kNever = 1e9, kMostStampS = 1e11;
 constexpr std::size_t kMostEnds = 512;
-constexpr double kSure = 18;         // median deviations
-constexpr double kSureToLikely = 6;  // three are likely
-constexpr std::size_t kEnough = 64;  // reads that show how late frames come
-constexpr double kDense = 0.1, kFits = 0.01;
+constexpr double kSure = 18;           // median deviations
+constexpr std::size_t kWitnesses = 3;  // stamps in a row that bear each other out
+constexpr double kDense = 0.1;
 constexpr double kKnown = 0.05;        // a rate that is surer tells what was lost
 constexpr std::size_t kFew = 4;        // reads at the end, which are late alone
-constexpr double kStoredJumpS = 0.1;   // of stamps in a file, where no arrival bears a longer one out
 constexpr double kClockDrifts = 0.01;  // at most, from the port's
 constexpr double kClockOff = 0.5;      // of a device's clock from the port's, as a share
 
 /// Whether these frames, which came so long after a read that had emptied the port, are more than can have
 /// been made since: then they had waited, too, and belong to that read.
 inline bool waited_before(double frames, double seconds, double period_s) {
-  return frames - seconds / period_s > 0.5 + 0.02 * frames;
+  return frames - seconds / period_s > 0.5;
 }
 
 /// As short as the period may be.
@@ -40,7 +55,9 @@ inline double shortest(const Rate& rate) { return rate.period_s * (1 - std::min(
 
 /// So long (s) must reads go on, whose delays are `jitter_s`, until one was on time: those that come sooner
 /// after one another than they are late are late together.
-inline double span_s(double jitter_s) { return std::clamp(kReads * jitter_s, kReadsS, 8 * kReadsS); }
+inline double span_s(double jitter_s, double unit_s) {
+  return unit_s > 0 ? kReads * unit_s : std::clamp(kReads * jitter_s, kReadsS, 8 * kReadsS);
+}
 
 /// Whether so many reads in a row, `seconds` in all, are late by `rise_s` for good: of those that are later
 /// than `jitter_s`, which one in ten is, one in ten is later than twice that.
@@ -54,12 +71,11 @@ inline bool for_good(std::size_t reads, double seconds, double rise_s, double ji
 /// time, which makes it too long: a stated one that is shorter by less than kDense is the period then, and
 /// one that is another's says nothing. Losses show one by one where frames are late by less than a quarter of
 /// a period.
-inline Rate doubted(Rate found, const ClockSettings& settings, double jitter_s) {
-  const double off = found.period_s / settings.period_s;
-  if (settings.tolerance < kKnown || jitter_s < 0.25 * found.period_s || std::abs(off - 1) <= kFits)
-    return found;
+inline Rate doubted(Rate found, double stated_s, double tolerance, double jitter_s) {
+  const double off = found.period_s / stated_s;
+  if (tolerance < kKnown || jitter_s < 0.25 * found.period_s) return found;
   const bool stated = off > 1 && off * (1 - kDense) < 1;
-  found.uncertain = std::max(found.uncertain, stated ? 1 - 1 / off : kDense);
+  found.uncertain = std::max(found.uncertain, stated ? 1 - (1 - kSteady) / off : kDense);
   return found;
 }
 
@@ -70,7 +86,13 @@ inline double grain(double unit_s, double period_s) {
 
 /// The period, as the earliest of every few reads tell it: the median slope between two that lie as far apart
 /// as makes it surest, at most `farthest` of the whole. A loss spoils the slopes across it only, so that they
-/// may not lie too far apart. kNever uncertain: there are too few reads.
-Rate slope_of(std::span<const ReadEnd> ends, double period_s, double farthest);
+/// may not lie too far apart. Reads are `unit_s` off at most. kNever uncertain: there are too few.
+Rate slope_of(std::span<const ReadEnd> ends, double period_s, double farthest, double unit_s);
 
-}  // namespace supertac::clock_model
+/// How late `ends` are: each against the earliest of a window of kReads and more, which lasts `span_s`. Where
+/// reads are late together, the earliest is late, too: by as much as that of the next window is earlier. The
+/// most of this, were it as rare as 1 of the windows and kChance decades, shows a jitter of its own.
+Lateness lateness_of(std::span<const ReadEnd> ends, const Rate& rate, double span_s);
+
+}  // namespace clock_model
+}  // namespace supertac

@@ -1,3 +1,5 @@
+#include "data/clock/device_stamps.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -14,55 +16,78 @@ double finer_unit(double stamp_s, double unit_s) {
   return unit_s;
 }
 
-double DeviceStamps::step_to(double raw_s, double from_s, double most_s) const {
-  const double step = raw_s - from_s, range = settings_.stamp_range_s;
+double DeviceStamps::latest_s() const { return now_s_ - head_.least_lag_s + 2 * kClockDrifts * elapsed_s_; }
+
+double DeviceStamps::step_from(const Mark& one, double raw_s, double most_s) const {
+  const double step = raw_s - one.raw_s, range = settings_.stamp_range_s, elapsed_s = now_s_ - one.arrived_s;
   if (range <= 0) return step;
-  if (elapsed_s_ > 0.5 * range) return step + range * std::round((elapsed_s_ - step) / range);
+  if (elapsed_s > 0.5 * range) return step + range * std::round((elapsed_s - step) / range);
   return step < 0 && step + range <= most_s ? step + range : step;
 }
 
-DeviceStamps::Reading DeviceStamps::read(double stamp_s, double elapsed_s, double period_s) {
-  if (!settings_.stored)
-    elapsed_s_ += elapsed_s, now_s_ += elapsed_s, least_lag_s_ += kClockDrifts * elapsed_s;
-  ++since_;
-  if (!(std::abs(stamp_s) < kMostStampS)) return {};
-  settings_.stamp_unit_s = finer_unit(stamp_s, settings_.stamp_unit_s);
-  if (believed_ == 0) return accept(stamp_s, stamp_s, {});
+// The longest chain of stamps that this one can follow.
+DeviceStamps::Mark DeviceStamps::chained(double raw_s, double period_s) const {
+  Mark mark{.raw_s = raw_s,
+            .time_s = raw_s,
+            .arrived_s = now_s_,
+            .least_lag_s = now_s_ - raw_s,
+            .number = number_,
+            .root = number_,
+            .length = 1};
   const double least = settings_.stamp_unit_s > 0.25 * period_s ? 0 : 1e-9;
-  // As late as the frames are, so far may a stamp be ahead.
-  const double lag_s = now_s_ - last_.time_s - least_lag_s_;
-  const double most = std::max({settings_.stored ? kStoredJumpS : lag_s + kOldestS, 10 * period_s});
-  const auto goes_on = [&](double step) { return step >= least && step <= most; };
-  const double step = step_to(stamp_s, last_.raw_s, most);
-  if (goes_on(step)) return accept(stamp_s, last_.time_s + step, {});
-  // Where the one before had jumped ahead, and not this one back, it goes on from the one before that.
-  const double from_before = step_to(stamp_s, before_.raw_s, most), last_step = last_.time_s - before_.time_s;
-  if (believed_ > 1 && !jumped_s_ && goes_on(from_before) &&
-      std::abs(from_before - 2 * step_s_) < std::abs(last_step - step_s_))
-    return accept(stamp_s, before_.time_s + from_before, {.one_before_damaged = true});
-  const double from_jump = jumped_s_ ? step_to(stamp_s, *jumped_s_, most) : -1;
-  const bool as_far =
-      settings_.stored && from_jump > 0 && std::abs(from_jump - jump_step_s_) < 0.5 * jump_step_s_;
-  if (!goes_on(from_jump) && !as_far) {
-    jumped_s_ = stamp_s, jump_step_s_ = from_jump;
-    return {};
+  for (const Mark& one : marks_) {
+    // As late as the frames are, so far may a stamp be ahead.
+    const double most = settings_.stored ? 10 * period_s : now_s_ - one.time_s - one.least_lag_s + kOldestS;
+    const double step = step_from(one, raw_s, most);
+    const bool as_far = settings_.stored && one.number == number_ - 1 && step > 0 &&
+                        std::abs(step - one.step_s) < 0.5 * one.step_s;
+    if (one.number == number_ - 1) mark.step_s = step;
+    if (step < least || (step > most && !as_far) || one.length + 1 < mark.length) continue;
+    const double time_s = one.time_s + step;
+    mark.time_s = time_s, mark.before = one.number, mark.root = one.root, mark.length = one.length + 1;
+    mark.least_lag_s = std::min(one.least_lag_s + kClockDrifts * (now_s_ - one.arrived_s), now_s_ - time_s);
   }
-  // Two stamps in a row: the device had paused, or it started anew.
-  const bool paused = settings_.stored ? stamp_s > last_.raw_s : step > 0 && step <= most;
-  const double since = paused ? step : std::max({elapsed_s_, period_s * since_, from_jump + 1e-3 * period_s});
-  last_ = {*jumped_s_, last_.time_s + since - from_jump};
-  return accept(stamp_s, last_.time_s + from_jump,
-                {.one_before_s = last_.time_s, .reset = !paused && believed_ > 1, .anew = !paused});
+  return mark;
 }
 
-DeviceStamps::Reading DeviceStamps::accept(double raw_s, double time_s, Reading reading) {
-  if (!reading.one_before_damaged) step_s_ = last_.time_s - before_.time_s, before_ = last_;
-  last_ = {raw_s, time_s};
-  least_lag_s_ = believed_ == 0 || reading.anew ? now_s_ - time_s : std::min(least_lag_s_, now_s_ - time_s);
-  jumped_s_.reset();
-  jump_step_s_ = elapsed_s_ = since_ = 0;
-  ++believed_;
-  reading.time_s = time_s;
+DeviceStamps::Reading DeviceStamps::read(double stamp_s, double elapsed_s, double period_s) {
+  if (!settings_.stored) now_s_ += elapsed_s_ = elapsed_s;
+  ++number_;
+  if (!(std::abs(stamp_s) < kMostStampS)) return {};
+  settings_.stamp_unit_s = finer_unit(stamp_s, settings_.stamp_unit_s);
+  Mark mark = chained(stamp_s, period_s);
+  Reading reading;
+  const bool goes_on = mark.root == head_.root || head_.number == 0;
+  const bool other = !goes_on && mark.length >= kWitnesses;
+  const bool believed = other || (goes_on && mark.length >= head_.length);
+  marks_.push_back(mark);
+  if (other) {
+    const Mark& root = *std::ranges::find(marks_, mark.root, &Mark::root);
+    const double ahead_s = root.raw_s - head_.raw_s;
+    const bool paused = settings_.stored && ahead_s > 0;
+    reading.reset = !paused && head_.length > 1, reading.anew = !paused;
+    const double since_s = paused ? ahead_s
+                                  : std::max(root.arrived_s - head_.arrived_s,
+                                             period_s * static_cast<double>(root.number - head_.number));
+    const double off_s = head_.time_s + since_s - root.time_s;
+    for (Mark& one : marks_)
+      if (one.root == mark.root) one.time_s += off_s, one.least_lag_s -= off_s;
+    mark = marks_.back();
+  }
+  if (believed && mark.before != head_.number) {
+    std::uint64_t on = mark.number;
+    for (std::size_t k = marks_.size(); k-- > 0;) {
+      const Mark& one = marks_[k];
+      const bool is_on = one.number == on;
+      if (is_on) on = one.before;
+      if (is_on || one.root == mark.root)
+        reading.revised.push_back({number_ - one.number, is_on ? std::optional(one.time_s) : std::nullopt});
+    }
+  }
+  if (believed) head_ = mark, reading.time_s = mark.time_s;
+  std::erase_if(marks_, [&](const Mark& one) {
+    return one.number + kWitnesses <= number_ && one.number != head_.number;
+  });
   return reading;
 }
 
