@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -10,7 +11,6 @@
 #include "data/plates/height_map.h"
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
-#include "data/windows/contact_level.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/median.h"
@@ -273,15 +273,6 @@ void WindowSet::window(std::size_t i, std::span<float> out) const {
   if (settings_.scaling.per_window) normalise_window(out, array().signals());
 }
 
-void WindowSet::will_read(std::size_t i) const {
-  const Place place = place_of(i);
-  const Stored& stored = stored_[place.pass];
-  file_->will_read(stored.samples + (place.last + 1 - frames()) * array().signals(), input_size());
-  file_->will_read(stored.fingers + place.last * kFingerNumbers, kFingerNumbers);
-  if (truth_is_measured(place.pass))
-    file_->will_read(stored.truths + place.last * image().pixels(), image().pixels());
-}
-
 std::vector<float> WindowSet::window(std::size_t i) const {
   std::vector<float> values(input_size());
   const Place place = place_of(i);
@@ -375,6 +366,26 @@ std::string WindowSet::fingerprint() const {
                (rows_[r].last + (i - rows_[r].first_window) * rows_[r].stride));
   }
   return hash.hex();
+}
+
+float contact_level(std::span<const float> truth, std::size_t pixels) {
+  constexpr double kSigmas = 6, kMost = 0.1, kSigmasOf95 = 1.645;
+  constexpr std::size_t kShare = 10, kLeastFrames = 3, kMostFrames = 200;
+  const std::size_t frames = truth.size() / pixels;
+  std::vector<double> sums(frames);
+  for (std::size_t f = 0; f < frames; ++f)
+    for (const float v : truth.subspan(f * pixels, pixels)) sums[f] += double{v};
+  std::vector<std::size_t> quiet(frames);
+  std::iota(quiet.begin(), quiet.end(), std::size_t{0});
+  std::ranges::stable_sort(quiet, {}, [&](std::size_t f) { return sums[f]; });
+  quiet.resize(std::min(frames / kShare, kMostFrames));
+  if (quiet.size() < kLeastFrames) return 0;
+  std::vector<double> values;
+  for (const std::size_t f : quiet)
+    for (const float v : truth.subspan(f * pixels, pixels)) values.push_back(double{v});
+  const double rest = median(values);
+  const double level = rest + kSigmas * (quantile(values, 0.95) - rest) / kSigmasOf95;
+  return level <= kMost ? static_cast<float>(level) : 0;
 }
 
 }  // namespace supertac

@@ -87,8 +87,6 @@ class WindowSet {
   static WindowSet load(const std::string& dir, const std::vector<std::string>& plates,
                         const WindowSettings& settings, const ReadingWatch& watch = {});
 
-  WindowSet(const WindowSet&) = default;
-  virtual ~WindowSet() = default;  // studies and tests change or watch what is read
   /// An empty set, to be filled by add().
   /// Throws std::invalid_argument on settings out of range.
   explicit WindowSet(const WindowSettings& settings);
@@ -121,11 +119,11 @@ class WindowSet {
   // i < size() throughout, unchecked: these run for every sample of training.
   // Throws std::invalid_argument when `out` has another size; FileError as ScratchFile.
   /// Window i as a network takes it, [T][signals], oldest frame first; normalised when the scaling says so.
-  virtual void window(std::size_t i, std::span<float> out) const;
+  void window(std::size_t i, std::span<float> out) const;
   /// The window, not normalised.
   std::vector<float> window(std::size_t i) const;
   /// Truth of its last frame, [height][width] of image(): as measured, or truth_image; 0 in the air.
-  virtual void truth(std::size_t i, std::span<float> out) const;
+  void truth(std::size_t i, std::span<float> out) const;
   /// The last frame, [signals].
   std::vector<float> last_frame(std::size_t i) const;
   /// The finger's centre on the plate; NaN where it is unknown.
@@ -142,8 +140,6 @@ class WindowSet {
   /// measured.
   std::optional<float> contact_level() const;
   std::size_t pass_of(std::size_t i) const { return place_of(i).pass; }
-  /// A hint that window i is read soon: the system may fetch it from the file.
-  virtual void will_read(std::size_t i) const;
   /// Number of the last frame within its pass.
   std::size_t frame_of(std::size_t i) const { return place_of(i).last; }
   /// Frames since its pass began or since the last gap, the last frame included: at least frames().
@@ -193,5 +189,11 @@ class WindowSet {
   std::vector<float> contact_levels_;  // of the recordings with a measured truth
   std::shared_ptr<ScratchFile> file_;  // of copies too: all append to it
 };
+
+/// Of a truth [frames][pixels] that a film or a camera measured: its level at rest and six times its noise
+/// there. Both are taken from the pixels of the tenth of the frames that sum to the least: their median, and
+/// how far their 95th percentile lies above it, since noise is often cut off at 0. 0 where these frames are
+/// fewer than three, or where this gives more than a tenth of the range: then nothing rests.
+float contact_level(std::span<const float> truth, std::size_t pixels);
 
 }  // namespace supertac

@@ -64,10 +64,4 @@ void ScratchFile::read(std::uint64_t place, std::span<float> numbers) const {
   }
 }
 
-// A hint: what comes of it does not matter.
-void ScratchFile::will_read(std::uint64_t place, std::uint64_t count) const {
-  (void)::posix_fadvise(file_, static_cast<off_t>(place * sizeof(float)),
-                        static_cast<off_t>(count * sizeof(float)), POSIX_FADV_WILLNEED);
-}
-
 }  // namespace supertac

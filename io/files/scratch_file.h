@@ -24,8 +24,6 @@ class ScratchFile {
   std::uint64_t append(std::span<const float> numbers);
   /// Fills all of `numbers` with those from `place` on. Throws FileError on an I/O error.
   void read(std::uint64_t place, std::span<float> numbers) const;
-  /// A hint that `count` numbers from `place` on are read soon: the system may fetch them.
-  void will_read(std::uint64_t place, std::uint64_t count) const;
 
  private:
   std::string folder_;

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "data/windows/transforms/mirror.h"
-
 namespace supertac {
 namespace {
 

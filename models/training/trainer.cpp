@@ -27,7 +27,6 @@ Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Obj
       ranks_(ranks) {
   check_format(windows, model());
   indices_.resize(batching_.batch_size());
-  next_.resize(indices_.size());
   check_micro_batches(ranks.size(), indices_.size());
   const Dim n = static_cast<Dim>(indices_.size()),
             micro_batches = static_cast<Dim>(micro_batches_of(indices_.size()));
@@ -73,16 +72,6 @@ void Trainer::fill(MicroBatch& micro_batch) const {
   }
 }
 
-// While this step is computed, a disk may fetch this process's share of the next batch.
-void Trainer::announce_next() {
-  if (step() + 1 >= total_steps()) return;
-  batch_of(step() + 1, next_);
-  const auto first = static_cast<std::size_t>(micro_batches_.front().first);
-  const auto end =
-      static_cast<std::size_t>(micro_batches_.back().first + micro_batches_.back().batch.inputs.dim(0));
-  for (std::size_t slot = first; slot < end; ++slot) windows_.will_read(next_[slot]);
-}
-
 // The numbers of sample i of step s do not depend on how the batch is cut.
 void Trainer::draw_noise(MicroBatch& micro_batch) const {
   const RandomStream random(objective_.recipe().seed, kNoiseStream);
@@ -125,7 +114,6 @@ void Trainer::batch_of(std::int64_t step, std::span<std::uint32_t> out) const {
 StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMicroBatch& around) {
   if (done())
     throw std::invalid_argument("train_step: all " + std::to_string(total_steps()) + " steps are done");
-  announce_next();
   batch_of(step(), indices_);
 #pragma omp parallel for schedule(static, 1)
   for (std::size_t i = 0; i < micro_batches_.size(); ++i) {

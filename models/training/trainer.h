@@ -119,7 +119,6 @@ class Trainer {
   };
   void run(MicroBatch& micro_batch) const;
   void fill(MicroBatch& micro_batch) const;
-  void announce_next();
   void draw_noise(MicroBatch& micro_batch) const;
   // In step_statistics.cpp:
   void add_up_statistics(StepReport& report);
@@ -132,7 +131,7 @@ class Trainer {
   TrainingState state_;
   Ranks& ranks_;
   std::vector<double> statistics_, of_partner_;
-  std::vector<std::uint32_t> indices_, next_;                          // of the batch, and of that behind it
+  std::vector<std::uint32_t> indices_;                                 // of the batch
   std::vector<MicroBatch> micro_batches_;                              // of this process
   std::vector<const std::vector<Parameter>*> micro_batch_parameters_;  // of these models
 };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <string>
 
 #include "data/windows/windows.h"
@@ -64,8 +65,10 @@ inline Recipe small_training() {
   return s;
 }
 
-/// Two short passes of a bump sliding under the array: the voltage falls where the plate is high.
-inline WindowSet small_windows(const SuperTacSettings& model, std::size_t frames = 150) {
+/// Two short passes of a bump sliding under the array: the voltage falls where the plate is high. `spoil` may
+/// change each.
+inline WindowSet small_windows(const SuperTacSettings& model, std::size_t frames = 150,
+                               const std::function<void(Recording&)>& spoil = {}) {
   WindowSettings settings;
   settings.timesteps = static_cast<int>(model.timesteps);
   settings.scale = static_cast<int>(model.scale);
@@ -87,6 +90,7 @@ inline WindowSet small_windows(const SuperTacSettings& model, std::size_t frames
         r.volts.push_back(static_cast<float>(2.44 - 0.1 * height - 0.002 * ((trial + k) % 3)));
       }
     }
+    if (spoil) spoil(r);
     windows.add(r);
   }
   return windows;

@@ -34,7 +34,6 @@ TEST_F(ScratchFiles, GiveBackWhatWasAppendedAndLeaveNoName) {
   std::vector<float> part(5);
   file.read(9'998, part);
   EXPECT_EQ(part, (std::vector<float>{9998, 9999, 50, 51, 52}));
-  file.will_read(0, 10'000);
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
   EXPECT_THROW(file.read(9'999, part), FileError);  // it ends before
 }

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "autograd/kernels/fast/isa/isa.h"
-#include "data/windows/transforms/mirror.h"
+#include "data/windows/transforms/augment.h"
 #include "io/files/json.h"
 #include "io/numbers/hash.h"
 #include "models/inference/evaluation.h"

@@ -1,4 +1,4 @@
-#include "data/windows/transforms/mirror.h"
+#include "data/windows/transforms/augment.h"
 
 #include <gtest/gtest.h>
 

@@ -19,19 +19,6 @@
 namespace supertac {
 namespace {
 
-/// The same windows, two of them exchanged.
-class Exchanged : public WindowSet {
- public:
-  Exchanged(const WindowSet& of, std::uint32_t one, std::uint32_t other)
-      : WindowSet(of), one_(one), other_(other) {}
-  void window(std::size_t i, std::span<float> out) const override { WindowSet::window(at(i), out); }
-  void truth(std::size_t i, std::span<float> out) const override { WindowSet::truth(at(i), out); }
-
- private:
-  std::size_t at(std::size_t i) const { return i == one_ ? other_ : i; }
-  std::size_t one_, other_;
-};
-
 void flip(real& value, std::uint32_t bit) {
   value = std::bit_cast<real>(std::bit_cast<std::uint32_t>(value) ^ (1U << bit));
 }
@@ -246,11 +233,18 @@ TEST_F(OpenedSteps, AnotherSampleIsFoundWithItsMicroBatch) {
   const auto batch = std::ranges::find(right_.operators, "batch", [](const auto& ran) { return ran["op"]; });
   const std::vector<std::uint32_t> examples = (*batch)["examples"];
   for (int plant = 0; plant < plants();) {
-    const std::size_t slot = below(examples.size());
-    const Exchanged other(small_.windows, examples[slot],
-                          static_cast<std::uint32_t>(below(small_.windows.size())));
+    const std::size_t pass = below(2), frame = below(150);
+    const auto holds = [&](std::uint32_t i) {
+      const std::size_t last = small_.windows.frame_of(i);
+      return small_.windows.pass_of(i) == pass && frame <= last && last - frame < small_.windows.frames();
+    };
+    const auto slot = std::ranges::find_if(examples, holds) - examples.begin();
+    if (slot == std::ssize(examples)) continue;
+    const WindowSet other = small_windows(small_.recipe.model, 150, [&](Recording& r) {
+      if (r.trial == static_cast<int>(pass) + 1) r.volts[frame * kTaxels] = 2.0F;
+    });
     const auto at = found([&](const Keep& keep) { return opened(other, {.keep = keep}); });
-    if (!at) continue;                                       // exchanged for itself
+    ASSERT_TRUE(at);
     EXPECT_EQ(at->name, std::to_string(slot) + "/windows");  // eight micro-batches of one example
     ++plant;
   }
