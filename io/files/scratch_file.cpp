@@ -6,7 +6,6 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <random>
 
 #include "io/files/file.h"
 #include "io/files/sync_folder.h"
@@ -27,8 +26,9 @@ std::string temporary_folder() {
 // In turn, so that every process and thread tries a name of its own; O_EXCL refuses one that somebody
 // planted.
 std::string name_in(const std::string& folder) {
-  std::random_device random;
-  return folder + "/.supertac-" + std::to_string(random()) + std::to_string(random());
+  std::uint64_t number = 0;
+  if (::getentropy(&number, sizeof number) != 0) fail(folder, "name", errno);
+  return folder + "/.supertac-" + std::to_string(number);
 }
 
 }  // namespace

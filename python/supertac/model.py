@@ -128,11 +128,15 @@ class Model:
             raise ValueError(f"the recording's signals run {why}; import it anew with the file of its sensor")
 
     def windows(self, recording: recordings.Recording) -> tuple[Array, Array]:
-        """Times and windows in volts of a recording that was filtered as the training was. Raises ValueError for one of
-        another array, unit or polarity than the model's."""
+        """Times and windows in the sensor's unit, filtered as the training was, of a recording. Raises ValueError for one of
+        another array, unit or polarity than the model's, and for one that another filter has gone over."""
         self._check(recording)
-        frames = self.settings["timesteps"]
-        return recordings.windows(recording, frames, self.input["rate_hz"])
+        done, wanted = float(recording.metadata.get("filter_s", 0)), self.input.get("filter_s")
+        same = wanted is None or abs(wanted - done) < 1e-4
+        if done > 0 and not same:
+            raise ValueError(f"the recording's signals have gone through a moving average of {done:g} s, the model was trained "
+                             f"behind one of {wanted:g} s; choose recordings and model of one kind")
+        return recordings.windows(recording, self.settings["timesteps"], self.input["rate_hz"], filter_s=0 if same else wanted)
 
     def pairs(self, folder: Path, stride: int = 1) -> tuple[Array, Array]:
         """What the model could be trained on of a folder of recordings, slides as presses: windows [N,T,S] as the network

@@ -40,7 +40,7 @@ class Recording:
 
     @property
     def period_s(self) -> float:
-        return float(np.median(np.diff(self.time_s)))
+        return float(np.median(np.diff(self.time_s))) if len(self.time_s) > 1 else 0
 
 
 @dataclasses.dataclass
@@ -53,6 +53,10 @@ class Log:
     half_widths: Array | None  # the same: of the pixels' 90 % intervals
     distances: Array | None  # [n], from what the model was trained on
     metadata: dict[str, str]
+
+    def __repr__(self) -> str:
+        unit = json.loads(self.metadata.get("signals", json.dumps(RIG_SIGNALS)))["unit"]
+        return f"Log({len(self.pictures)} pictures {list(self.pictures.shape[1:])} of {self.volts.shape[1]} signals in {unit})"
 
 
 SHAPES: dict[str, list[Any]] = {"time_s": ["n"], "volts": ["n", None], "position_mm?": ["n", 2], "lift_mm?": ["n"],
@@ -145,23 +149,34 @@ def _runs(times: Array, max_gap_s: float) -> Iterable[tuple[int, int]]:
     return zip([0, *cuts], [*cuts, len(times)])
 
 
+def _means(values: Array, first: Array) -> Array:
+    """Of each frame the mean of those from the first-th to it."""
+    return np.stack([values[a : i + 1].sum(axis=0, dtype=np.float64) / (i + 1 - a)
+                     for i, a in enumerate(first)]).astype(np.float32)
+
+
 def windows(recording: Recording, timesteps: int, rate_hz: float,
-            max_gap_s: float = 0.05) -> tuple[Array, Array]:
+            max_gap_s: float = 0.05, filter_s: float = 0) -> tuple[Array, Array]:
     """Times [N] and windows [N,timesteps,S] in volts, one for each frame that has a whole window behind it: what
     supertac-stream draws. Sample j of a run without a gap is the mean of the frames around the run's first time plus
-    j / rate_hz, as far as they have come; one without frames repeats the one before (data/recordings/resample.h)."""
+    j / rate_hz, as far as they have come; one without frames repeats the one before (data/recordings/resample.h).
+    filter_s: a moving average that comes first (data/windows/live_window.h)."""
     finite = np.isfinite(recording.volts).all(axis=1) & np.isfinite(recording.time_s)
     times, volts = recording.time_s[finite], recording.volts[finite]
-    if timesteps == 1:
-        return times, volts[:, None]
-    max_gap_s = max(max_gap_s, 3 * recording.period_s)  # a silence within so many periods of a slow sensor is none
+    period_s = recording.period_s
+    max_gap_s = max(max_gap_s, 3 * period_s)  # a silence within so many periods of a slow sensor is none
     out_times, out = [np.empty(0)], [np.empty((0, timesteps, volts.shape[1]), np.float32)]
     for begin, end in _runs(times, max_gap_s) if len(times) else ():
-        run = times[begin:end]
+        run, values = times[begin:end], volts[begin:end]
+        if filter_s > 0:
+            values = _means(values, np.searchsorted(run, run - max(0, filter_s - 0.5 * period_s)))
+        if timesteps == 1:
+            out_times.append(run)
+            out.append(values[:, None])
+            continue
         cell = np.maximum(0, np.ceil((run - run[0]) * rate_hz - 0.5 - SLACK)).astype(int)  # whose sample a frame is of
         first = np.searchsorted(cell, cell)  # the first frame of a frame's sample
-        so_far = np.stack([volts[begin + a : begin + i + 1].sum(axis=0, dtype=np.float64) / (i + 1 - a)
-                           for i, a in enumerate(first)]).astype(np.float32)
+        so_far = _means(values, first)
         last = np.searchsorted(cell, np.arange(cell[-1] + 1), side="right") - 1  # the frame that completes a sample
         ends = np.flatnonzero(cell >= timesteps - 1)
         chosen = last[cell[ends, None] + np.arange(1 - timesteps, 1)]

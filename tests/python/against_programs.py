@@ -131,11 +131,12 @@ def refuses_what_programs_refuse(folder, recording):
     return not list(folder.glob("bad*"))
 
 
-def compare(folder, data, preset, recording):
+def compare(folder, data, preset, recording, path=None):
     name, log = f"{preset} {data.name}", folder / f"{preset}{data.name}.log.safetensors"
-    path = folder / f"{preset}{data.name}.safetensors"
-    run("supertac-train", "--data", data, "--out", path, "--preset", preset, "--split", "none", "--quiet",
-        *TRAINING)
+    if path is None:
+        path = folder / f"{preset}{data.name}.safetensors"
+        run("supertac-train", "--data", data, "--out", path, "--preset", preset, "--split", "none", "--quiet",
+            *TRAINING)
     run("supertac-stream", "--recording", recording, "--model", path, "--out", log, "--quiet")
     seen, model = supertac.read_pictures(log), supertac.load_model(path)
     times, volts = model.windows(supertac.read_recording(recording))
@@ -202,10 +203,14 @@ def works_in_a_fork(model, volts):
 def clients(model, recording):
     """What is refused as by the programs; empty batches, single windows, what objects say of themselves."""
     volts = model.windows(recording)[1][:40]
+    for frames in (0, 1):
+        short = dataclasses.replace(recording, time_s=recording.time_s[:frames], volts=recording.volts[:frames])
+        assert model.windows(short)[1].shape == (0, *model.window)
     assert model(volts).shape == (40, *model(volts[0]).shape) and model(volts[:0]).shape[0] == 0
     assert " taxels" in repr(model) and f"{len(recording.time_s)} frames" in repr(recording)
     counts = {"signals": json.dumps({"unit": "counts", "pressed": "lower", "range": [0, 900]})}
     for change, words in (({"metadata": counts}, "unit 'counts', the model's 'V'"),
+                          ({"metadata": {"filter_s": "0.05"}}, "a moving average of 0.05 s"),
                           ({"array": recording.array | {"rows": 9}}, "taxels with")):
         try:
             model.windows(dataclasses.replace(recording, **change))
@@ -239,6 +244,10 @@ def main():
         for preset in ("tiny", "paper"):
             for data in (rig, other):
                 good &= compare(folder, data, preset, data / recordings[0].name)
+        raw = folder / "unfiltered"
+        run("supertac-simulate", "--out", raw, "--plates", "6_Ridges", "--passes", 1, "--trials", 1, "--speeds", 10,
+            "--without", "filter", "--quiet")
+        good &= compare(folder, raw, "tiny", next(raw.glob("*.safetensors")), folder / "tiny4x4.safetensors")
         recording = supertac.read_recording(recordings[0])
         good &= clients(supertac.load(folder / "tiny4x4.safetensors"), recording)
         good &= pairs_are_those_of_programs("tiny", supertac.load(folder / "tiny4x4.safetensors"), rig, folder)
