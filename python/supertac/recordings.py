@@ -151,8 +151,8 @@ def _runs(times: Array, max_gap_s: float) -> Iterable[tuple[int, int]]:
 
 def _means(values: Array, first: Array) -> Array:
     """Of each frame the mean of those from the first-th to it."""
-    return np.stack([values[a : i + 1].sum(axis=0, dtype=np.float64) / (i + 1 - a)
-                     for i, a in enumerate(first)]).astype(np.float32)
+    means: Array = np.stack([values[a : i + 1].sum(axis=0, dtype=np.float64) / (i + 1 - a) for i, a in enumerate(first)])
+    return means.astype(np.float32)
 
 
 def windows(recording: Recording, timesteps: int, rate_hz: float,
