@@ -117,7 +117,8 @@ nlohmann::ordered_json to_json(const Metrics& metrics) {
   nlohmann::ordered_json json;
   json["windows"] = metrics.windows;
   for (const auto& [name, field] : kFields)
-    json[name] = std::isfinite(metrics.*field) ? nlohmann::ordered_json(metrics.*field) : nlohmann::ordered_json();
+    json[name] =
+        std::isfinite(metrics.*field) ? nlohmann::ordered_json(metrics.*field) : nlohmann::ordered_json();
   return json;
 }
 
