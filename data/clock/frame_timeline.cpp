@@ -219,12 +219,10 @@ class StampedFrames {
       if (stamped)
         from = stamp_s_[i] - unit_s_ - 2 * (period - least), to = stamp_s_[i] + 2 * (period - least);
       const std::size_t behind = k + (stamped ? 0 : -1);
-      if (stamped) {
-        const double date = unit_s_ <= 0.25 * period
-                                ? stamp_s_[i] - unit_s_
-                                : std::clamp(tube.dates[i], stamp_s_[i] - unit_s_, stamp_s_[i]);
-        tube.dates[i] = std::max(std::min(date, latest(behind, 1, i, least)), earliest(k, 1, i, least));
-      }
+      if (stamped)
+        tube.dates[i] = unit_s_ <= 0.25 * period
+                            ? stamp_s_[i] - unit_s_
+                            : std::clamp(tube.dates[i], stamp_s_[i] - unit_s_, stamp_s_[i]);
       if (doubted || k == 0 || k + 1 >= at_.size())
         from = std::min({from, earliest(k, 1, i, least), earliest(k, 2, i, least)}),
         to = std::max({to, latest(behind, 1, i, least), latest(behind, 2, i, least)});
