@@ -37,10 +37,9 @@ constexpr double kAnyRate = 20;   // of a rate that is a word
 constexpr double kNever = 1e9, kMostStampS = 1e11;
 constexpr std::size_t kMostEnds = 512;
 constexpr double kSure = 18;           // median deviations
-constexpr std::size_t kWitnesses = 3;  // stamps in a row that bear each other out
+constexpr std::size_t kWitnesses = 3;  // reads, or stamps, in a row that bear each other out
 constexpr double kDense = 0.1;
 constexpr double kKnown = 0.05;        // a rate that is surer tells what was lost
-constexpr std::size_t kFew = 4;        // reads at the end, which are late alone
 constexpr double kClockDrifts = 0.01;  // at most, from the port's
 constexpr double kClockOff = 0.5;      // of a device's clock from the port's, as a share
 
@@ -64,7 +63,7 @@ inline double span_s(double jitter_s, double unit_s) {
 inline bool for_good(std::size_t reads, double seconds, double rise_s, double jitter_s) {
   const double alone =
       std::min({static_cast<double>(reads), 1.0 * kReads, 1 + seconds / std::max(jitter_s, 1e-9)});
-  return reads >= kFew && alone * rise_s > kDecades * jitter_s;
+  return reads >= kWitnesses && alone * rise_s > kDecades * jitter_s;
 }
 
 /// What a measured period is worth where nothing but the file's rate says whether frames are lost all the

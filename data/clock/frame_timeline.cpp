@@ -116,7 +116,7 @@ class TubeMaker {
     // Of few reads in a row one at least was not very late, of many one was hardly late.
     std::vector<double> slacks(slack_.begin(), slack_.end());
     const double usual_slack = slacks.empty() ? 0 : median(slacks);
-    std::array<Window, 2> windows = {Window{kFew, kFew * late_.jitter_s},
+    std::array<Window, 2> windows = {Window{kWitnesses, kWitnesses * late_.jitter_s},
                                      Window{kReads, span_s(late_.jitter_s, unit_s_)}};
     std::size_t b = 0, emptied = 0;  // the read of frame i; the one in front of it that took all
     for (std::size_t i = 0; i < n; ++i) {
@@ -194,7 +194,7 @@ class StampedFrames {
     for (std::size_t k = 0; k < at_.size(); ++k)
       if (const double most = latest(k, 1, at_[k], period) + unit_s_; stamp_s_[at_[k]] > most)
         out[at_[k]] = std::max({most, earliest(k, 1, at_[k], period), earliest(k, 2, at_[k], period)});
-    if (at_.size() > kFew) out[at_.front()] = out[at_.back()] = kUnknown;
+    if (at_.size() > kWitnesses) out[at_.front()] = out[at_.back()] = kUnknown;
     return out;
   }
 
@@ -289,7 +289,7 @@ Rate to_port(std::span<const double> arrived_s, double unit_s, Tube& tube) {
   std::vector<double> sorted = slack;
   const double most_s = 2 * median(sorted);
   for (std::size_t i = 0; i < count; ++i)
-    if (slack[i] > most_s || (count > kFew && (i == 0 || i + 1 == count))) witness[i] = kUnknown;
+    if (slack[i] > most_s || (count > kWitnesses && (i == 0 || i + 1 == count))) witness[i] = kUnknown;
   const Tube port = TubeMaker(tube.dates, witness, kNever, 1, kClockOff, slack).make();
   for (std::size_t i = 0; i < count; ++i) {
     const double before_s = tube.dates[i] - tube.from[i], after_s = tube.to[i] - tube.dates[i];
