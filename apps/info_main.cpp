@@ -13,11 +13,15 @@
 #include "io/files/safetensors.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
+#include "models/files/chain.h"
 
 namespace supertac {
 
 void declare(Arguments& arguments) {
   arguments.positional("FILE", "a .safetensors file, or a folder of recordings");
+  arguments.flag(
+      "chain",
+      "of a model: the hashes of all that lies between its recordings and a microcontroller's picture");
 }
 
 namespace {
@@ -144,9 +148,21 @@ int describe_folder(const Arguments& arguments) {
   return kExitOk;
 }
 
+// As supertac-export --c99 writes it without other options.
+int print_chain(const Arguments& arguments) {
+  nlohmann::ordered_json chain = nlohmann::ordered_json::array();
+  for (const ChainLink& link : exported(SafetensorsFile::read(arguments.text("FILE")), "finger", 0).chain) {
+    print_row(arguments, link.name, link.hash);
+    chain.push_back({{"link", link.name}, {"hash", link.hash}});
+  }
+  arguments.write_json({{"file", arguments.text("FILE")}, {"chain", chain}});
+  return kExitOk;
+}
+
 }  // namespace
 
 int run(Arguments& arguments) {
+  if (arguments.flag("chain")) return print_chain(arguments);
   if (std::filesystem::is_directory(arguments.text("FILE"))) return describe_folder(arguments);
   const SafetensorsFile file = SafetensorsFile::read(arguments.text("FILE"));
   const std::string kind = kind_of(file);

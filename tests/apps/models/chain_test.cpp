@@ -1,4 +1,4 @@
-// supertac-check chain: one bit that is changed anywhere is found, and its link
+// supertac-info --chain and supertac-check chain: one bit that is changed anywhere is found, and its link
 // named.
 #include <gtest/gtest.h>
 
@@ -129,6 +129,10 @@ TEST_F(Chain, HoldsFromTheRecordingsToThePicture) {
     EXPECT_EQ(row["said"], "ok") << row.dump();
   }
   EXPECT_EQ(links, (std::vector<std::string>{"recordings", "recipe", "model", "int8", "code", "picture"}));
+  // supertac-info prints the same, but for the code, which is made for another rate there.
+  const Json chain = Json::parse(succeed("supertac-info --chain model.safetensors --json -").out)["chain"];
+  ASSERT_EQ(chain.size(), links.size());
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(chain[i]["hash"], result["links"][i]["found"]);
 }
 
 TEST_F(Chain, ATrainingAgainGivesTheSameChain) {
