@@ -3,9 +3,11 @@
 
     bench/sensors/few_shot.py BIN SETS_DIR OUT_DIR [SET ...]
 
-Groups are parted as in real_sensors.py (seed 0). A body is fitted to 1,600 frames of the groups that are not tested,
-without their truth; 2,000 presses of it are simulated, and preset `frame` learns these. Then 1, 3 and 10 groups of real
-truth are learnt with them. Scores go to bench/results/few_shot.csv, beside two methods that learn nothing.
+Groups are parted as in real_sensors.py (seed 0). What a pooled array is by its making - its taxels are means, no skin
+lies over them, they are linear and remember nothing - stands in the sensor's file; the rest is fitted to 1,600 frames of
+the groups that are not tested, without their truth. 2,000 presses are simulated, and preset `frame` learns these. Then
+1, 3 and 10 groups of real truth are learnt with them. Scores go to bench/results/few_shot.csv, beside two methods that
+learn nothing.
 """
 import json
 import pathlib
@@ -23,6 +25,7 @@ from source import commit_of, keep, source
 KEPT = real_sensors.BENCH / "results" / "few_shot.csv"
 COLUMNS = ("set", "groups", "method", "frames", "ssim", "psnr_db", "peak_ssim", "peak_psnr_db", "contact_ssim",
            "contact_psnr_db", "command", "commit")
+BODY = {"taxel_mm": 1, "skin_mm": 0.01, "knee": 1000, "hysteresis_s": 1e-4}
 TOUCHED, PRESSES, EPOCHS, RATE_HZ = 1600, 2000, 4, 40  # sizes are in pitches: 1 mm stands for whichever it is
 
 
@@ -43,7 +46,7 @@ class Study:
         count, rows, columns = taxels.shape
         signals = {"unit": "share of the largest", "pressed": "higher", "range": [0, 1]}
         sensor = {"name": self.name, "rows": rows, "columns": columns, "pitch_mm": 1, "rate_hz": RATE_HZ,
-                  "body": {"taxel_mm": 1}, "frame": {"kind": "text"}} | signals
+                  "body": BODY, "frame": {"kind": "text"}} | signals
         (self.out / "sensor.json").write_text(json.dumps(sensor))
         array = {"rows": rows, "columns": columns, "pitch_mm": 1, "channels": 1}
         supertac.write_recording(self.out / "touched.safetensors", supertac.Recording(

@@ -49,6 +49,13 @@ const Form kForms[] = {
      [](double f, double) { return exp_of(f); }}};
 constexpr std::size_t kNumbers = std::size(kForms);
 
+// A number that the file states without an uncertainty is known, and is not looked for.
+std::optional<double> known(Body body, const std::string& key) {
+  if (body.uncertainty.contains(key) || (key == "knee" && !body.knee)) return {};
+  const double value = std::ranges::find(fitted_numbers(), key, &BodyNumber::key)->of(body);
+  return value != 0 ? std::optional(value) : std::nullopt;
+}
+
 // The inverse of a symmetric positive definite matrix [d][d], in place (Gauss-Jordan).
 void invert(std::vector<double>& a, std::size_t d) {
   for (std::size_t k = 0; k < d; ++k) {
@@ -213,7 +220,7 @@ BodyFitter::BodyFitter(const Sensor& sensor, std::uint64_t seed) : sensor_(senso
     drawn.body.uncertainty = {};
     for (std::size_t k = 0; k < kNumbers; ++k) {
       forms[i].push_back(std::lerp(kForms[k].least, kForms[k].most, random.uniform(i * (kNumbers + 1) + k)));
-      kForms[k].set(drawn.body, forms[i].back(), pitch);
+      if (!known(sensor.body, kForms[k].key)) kForms[k].set(drawn.body, forms[i].back(), pitch);
     }
     drawn.body.noise = 0.001 * same_bits::pow(10, random.uniform(i * (kNumbers + 1) + kNumbers));
     statistics[i] = touch_statistics(simulate_touching(drawn, kSeconds, seed * kSimulations + i));
@@ -252,6 +259,10 @@ BodyFit BodyFitter::operator()(const Recording& touches) const {
   const std::vector<double> predicted = (*regression_)(found);
   for (std::size_t k = 0; k < kNumbers; ++k) {
     const Form& form = kForms[k];
+    if (const auto stated = known(sensor_.body, form.key)) {
+      fit.numbers.push_back({form.key, *stated, 0, true});
+      continue;
+    }
     const double deviation = regression_->deviation(k, predicted[k]);
     const double of_prior = (form.most - form.least) / std::sqrt(12.0);
     const double inside = std::clamp(predicted[k], form.least, form.most);
@@ -266,6 +277,7 @@ BodyFit BodyFitter::operator()(const Recording& touches) const {
   creep.told = creep_s.told = creep.told && creep_s.told;
   for (std::size_t k = 0; k < kNumbers; ++k) {
     const FittedNumber& number = fit.numbers[k];
+    if (known(sensor_.body, number.key)) continue;
     kForms[k].set(fit.sensor.body, std::clamp(predicted[k], kForms[k].least, kForms[k].most), pitch);
     fit.sensor.body.uncertainty[number.key] = number.deviation;
   }

@@ -18,6 +18,8 @@ constexpr double kLeastNoise = 0.002, kMostNoise = 0.01;
 constexpr double kStrength = 0.25, kTaxelSpread = 0.05;
 constexpr double kGive = 0.25;  // of the skin: how far a hard press goes into it
 constexpr double kMarginSigmas = 2.5;
+constexpr double kNarrowest = 0.25;  // of a cell: a bell that is narrower would fall between cells
+constexpr int kPointsOfATaxel = 16;
 
 enum Draw : std::uint64_t { kSkin, kNoise, kOfStrength, kTimes = 10, kFit = 100, kTaxels = 1000 };
 constexpr std::uint64_t kSamples = 1'000'000;
@@ -38,17 +40,23 @@ Body drawn(Body body, const TaxelArray& array, const RandomStream& random) {
   return body;
 }
 
-// Weights of cells for the lines of taxels, [lines][cells], each line with sum 1; and those of a lean.
+// Weights of cells for the lines of taxels, [lines][cells], each line with sum 1, as the skin's bell is felt
+// over a taxel's side; and those of a lean.
 struct Bells {
   std::vector<double> weight, lean;
-  Bells(int lines, double pitch, int cells, double first, double step, double sigma) {
+  Bells(int lines, double pitch, int cells, double first, double step, const Body& body) {
+    const double skin = std::max(body.skin_mm / 2, kNarrowest * step),
+                 sigma = std::max(body.sigma_mm(), skin);
+    const int points = body.taxel_mm > 0 ? kPointsOfATaxel : 1;
     for (int line = 0; line < lines; ++line) {
       const double at = (line - (lines - 1) / 2.0) * pitch;
-      std::vector<double> bell;
+      std::vector<double> bell(static_cast<std::size_t>(cells));
       double sum = 0;
       for (int i = 0; i < cells; ++i) {
-        bell.push_back(same_bits::bell(first + i * step - at, sigma));
-        sum += bell.back();
+        double& felt = bell[static_cast<std::size_t>(i)];
+        for (int p = 0; p < points; ++p)
+          felt += same_bits::bell(first + i * step - at - body.taxel_mm * ((p + 0.5) / points - 0.5), skin);
+        sum += felt;
       }
       for (int i = 0; i < cells; ++i) {
         weight.push_back(bell[static_cast<std::size_t>(i)] / sum);
@@ -79,12 +87,11 @@ class Press {
         body_(drawn(sensor.body, sensor.array, random)),
         random_(random),
         scene_(objects, sensor.array, of_scene),
-        sigma_(std::max(body_.sigma_mm(), kMarginSigmas / 10 * sensor.array.pitch_mm.x / scale)),
-        field_(field_of(sensor.array, scale, sigma_)),
+        field_(field_of(sensor.array, scale, body_.sigma_mm())),
         across_(sensor.array.columns, sensor.array.pitch_mm.x, field_.columns, field_.left_mm,
-                field_.cell_x_mm, sigma_),
+                field_.cell_x_mm, body_),
         along_(sensor.array.rows, sensor.array.pitch_mm.y, field_.rows, field_.top_mm, field_.cell_y_mm,
-               sigma_),
+               body_),
         response_(body_, sensor.array),
         strength_(1 + kStrength * (2 * random.uniform(kOfStrength) - 1)),
         pace_(pace),
@@ -151,7 +158,6 @@ class Press {
   Body body_;
   RandomStream random_;
   Scene scene_;
-  double sigma_;
   Field field_;
   Bells across_, along_;
   BodyResponse response_;
@@ -180,11 +186,9 @@ Recording simulate_presses(const Sensor& sensor, const Presses& presses, std::ui
         stream_of("press/" + presses.kind + "/" + std::to_string(presses.number) + "/" + std::to_string(i));
     const RandomStream random(seed, stream);
     Press press(sensor, {presses.kind}, scale, random, RandomStream(seed, stream + 1));
-    std::vector<double> times;
-    for (std::uint64_t f = 0; f < kFramesOfAPress; ++f)
-      times.push_back(Scene::kSeconds * (static_cast<double>(f) + 0.1 + 0.9 * random.uniform(kTimes + f)) /
-                      kFramesOfAPress);
-    for (const double t : times) {
+    for (std::uint64_t f = 0; f < kFramesOfAPress; ++f) {
+      const double t = Scene::kSeconds * (static_cast<double>(f) + 0.1 + 0.9 * random.uniform(kTimes + f)) /
+                       kFramesOfAPress;
       recording.time_s.push_back(i * Scene::kSeconds + t);
       press.frame(t, scale, recording);
     }

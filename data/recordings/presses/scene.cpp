@@ -11,9 +11,12 @@
 namespace supertac {
 namespace {
 
-enum Kind { kDisc, kBar, kRing, kEdge, kLetter, kBlob, kFingertip, kMixed };
-const std::vector<std::string> kKinds = {"disc",   "bar",  "ring",      "edge",
-                                         "letter", "blob", "fingertip", "mixed"};
+enum Kind { kDisc, kBar, kRing, kEdge, kLetter, kFingertip, kMixed, kSurface };
+// Surfaces from grains to hills as large as the array, as many as other kinds.
+constexpr int kSurfaces = 7;
+const std::vector<std::string> kKinds = {"disc",      "bar",      "ring",     "edge",     "letter",
+                                         "fingertip", "mixed",    "surface1", "surface2", "surface3",
+                                         "surface4",  "surface5", "surface6", "surface7"};
 
 // Of none, one, two, three and four contacts: shares of all scenes up to each.
 constexpr std::array<double, 4> kCounts = {0.1, 0.45, 0.75, 0.9};
@@ -34,11 +37,17 @@ enum Draw : std::uint64_t {
   kMoves,
   kWhere,
   kSpeed,
-  kShape
+  kShape,
+  kWaves = 4096  // behind the numbers of all contacts
 };
 
 constexpr double kSmallest = 0.5, kLargest = 2.5;  // sizes, in pitches
 constexpr double kHardEdge = 0.1;                  // of the size: how far the pressure takes to grow
+
+// A surface: so many waves, from half a pitch to at most twice the array, whose heights fall with the length
+// by the power 0 (noise) to 1.5 (hills); what lies up to 1.5 deviations above or below the mean touches.
+constexpr std::uint64_t kWavesOfASurface = 32;
+constexpr double kShortestWave = 0.5, kSteepest = 1.5, kLevel = 1.5, kPeak = 3;
 
 // Strokes x, y, x, y in a square of -1 to 1.
 const std::vector<std::vector<double>> kLetters = {
@@ -106,8 +115,55 @@ Scene::Contact Scene::draw(int kind, const Objects& objects, const TaxelArray& a
     c.move_y_mm_s = speed * same_bits::sine(uniform(kWhere));
   }
   if (kind == kLetter) c.shape = kLetters[static_cast<std::size_t>(uniform(kShape) * 8)];
-  for (std::uint64_t k = 0; kind == kBlob && k < 6; ++k) c.shape.push_back(0.3 * (uniform(kShape + k) - 0.5));
+  if (kind >= kSurface) {
+    const double level = kLevel * (2 * uniform(kShape) - 1);
+    c.size_mm = level, c.edge_mm = kPeak + level;  // heights, in standard deviations
+    c.waves = draw_waves((kind - kSurface + uniform(kSize)) / kSurfaces, pitch, std::max(width, height),
+                         random, kWaves + 8 * first);
+  }
   return c;
+}
+
+// A Gaussian random field of standard deviation 1 whose spectrum is a power law (self-affine, as rough
+// surfaces are) and whose longest wave is `size` of the way from one pitch to twice the array.
+std::vector<Scene::Wave> Scene::draw_waves(double size, double pitch, double length,
+                                           const RandomStream& random, std::uint64_t first) {
+  const double shortest = kShortestWave * pitch,
+               longest = 2 * shortest * same_bits::pow(length / shortest, size);
+  const double steepness = kSteepest * random.uniform(first);
+  std::vector<Wave> waves;
+  double squares = 0;
+  for (std::uint64_t k = first + 1; k <= first + 3 * kWavesOfASurface; k += 3) {
+    const double mm = shortest * same_bits::pow(longest / shortest, random.uniform(k)),
+                 turn = random.uniform(k + 1);
+    waves.push_back({.x_per_mm = same_bits::cosine(turn) / mm,
+                     .y_per_mm = same_bits::sine(turn) / mm,
+                     .phase = random.uniform(k + 2),
+                     .height = same_bits::pow(mm / longest, steepness)});
+    squares += waves.back().height * waves.back().height / 2;
+  }
+  for (Wave& wave : waves) wave.height /= std::sqrt(squares);
+  return waves;
+}
+
+// Heights [rows][columns] of a contact's waves: of each, cos(x + y) = cos x cos y - sin x sin y.
+std::vector<double> Scene::heights(const Contact& c, double x0_mm, double y0_mm, const Field& field) {
+  std::vector<double> heights(field.cells());
+  for (const Wave& wave : c.waves) {
+    std::vector<double> cosines, sines;
+    for (int column = 0; column < field.columns; ++column) {
+      const double turns = wave.x_per_mm * (field.x_mm(column) - x0_mm) + wave.phase;
+      cosines.push_back(wave.height * same_bits::cosine(turns));
+      sines.push_back(wave.height * same_bits::sine(turns));
+    }
+    auto height = heights.begin();
+    for (int row = 0; row < field.rows; ++row) {
+      const double turns = wave.y_per_mm * (field.y_mm(row) - y0_mm);
+      const double cosine = same_bits::cosine(turns), sine = same_bits::sine(turns);
+      for (std::size_t i = 0; i < cosines.size(); ++i) *height++ += cosines[i] * cosine - sines[i] * sine;
+    }
+  }
+  return heights;
 }
 
 // How far within the outline a point lies (x, y from the object's middle, turned with it), below 0 outside.
@@ -128,17 +184,6 @@ double Scene::inside_mm(const Contact& c, double x, double y) {
         nearest = std::min(nearest, distance_to_stroke(&c.shape[i], x / c.size_mm, y / c.size_mm));
       return c.other_mm / 2 - nearest * c.size_mm;
     }
-    case kBlob: {  // radius = size (1 + sum of a_k cos(k angle) + b_k sin(k angle))
-      if (from_middle <= 0) return c.size_mm;
-      const double cosine = x / from_middle, sine = y / from_middle;
-      double radius = 1, re = 1, im = 0;
-      for (std::size_t k = 0; k < c.shape.size(); k += 2) {
-        const double turned = re * cosine - im * sine;
-        im = re * sine + im * cosine, re = turned;
-        if (k > 0) radius += 2 * (c.shape[k] * re + c.shape[k + 1] * im);
-      }
-      return c.size_mm * radius - from_middle;
-    }
     case kFingertip: {
       const double stretched = std::sqrt(x * x + y * y * (c.size_mm / c.other_mm) * (c.size_mm / c.other_mm));
       return c.size_mm - stretched;
@@ -157,11 +202,14 @@ void Scene::pressure(double t, const Body& body, double give_mm, const Field& fi
     const double depth = c.most * std::min(down, up);
     if (depth <= 0) continue;
     const double x0 = c.x_mm + c.move_x_mm_s * t, y0 = c.y_mm + c.move_y_mm_s * t;
+    const std::vector<double> of_waves = !c.waves.empty() ? heights(c, x0, y0, field) : std::vector<double>{};
     const auto each = [&](auto use) {
       for (int row = 0; row < field.rows; ++row)
         for (int column = 0; column < field.columns; ++column) {
           const double x = field.x_mm(column) - x0, y = field.y_mm(row) - y0;
-          const double within = inside_mm(c, x * c.cosine + y * c.sine, y * c.cosine - x * c.sine);
+          const double within =
+              of_waves.empty() ? inside_mm(c, x * c.cosine + y * c.sine, y * c.cosine - x * c.sine)
+                               : c.size_mm + of_waves[static_cast<std::size_t>(row * field.columns + column)];
           if (within > 0) use(row, column, std::min(1.0, within / c.edge_mm));
         }
     };

@@ -11,7 +11,9 @@
 
 namespace supertac {
 
-/// The objects: disc, bar, ring, edge, letter, blob, fingertip, and mixed, each of any kind.
+/// The objects: disc, bar, ring, edge, letter, fingertip, and mixed, each of any of these; and as many kinds
+/// of rough surface, as of bodies, feet and cloth: surface1 (grains) to surface7 (hills as large as the
+/// array).
 const std::vector<std::string>& press_kinds();
 
 /// A surface under an array, in mm from its centre.
@@ -25,8 +27,9 @@ struct Field {
 
 /// Zero to four contacts of one press, which lasts kSeconds. A contact comes down somewhere over the array or
 /// its edges, is loaded, may move and turn, and is lifted. Its outline is hard or soft: the pressure grows
-/// from 0 at the outline to that of the press within a tenth of the object's size, or to its middle. Drawn
-/// from `random` alone.
+/// from 0 at the outline to that of the press within a tenth of the object's size, or to its middle. A
+/// surface is a Gaussian random field whose spectrum is a power law; what lies above a level that is drawn
+/// touches, the harder the higher. Drawn from `random` alone.
 class Scene {
  public:
   static constexpr double kSeconds = 1.2;
@@ -44,16 +47,23 @@ class Scene {
                 std::span<double> pressure) const;
 
  private:
+  struct Wave {
+    double x_per_mm, y_per_mm, phase, height;  // in turns, and standard deviations
+  };
   struct Contact {
     int kind = 0;
     double x_mm = 0, y_mm = 0, cosine = 1, sine = 0;  // of the beginning
     double move_x_mm_s = 0, move_y_mm_s = 0;
     double size_mm = 0, other_mm = 0, edge_mm = 0;  // of the outline; how far the pressure takes to grow
     double most = 0, down_s = 0, loaded_s = 0, lifting_s = 0, up_s = 0;
-    std::vector<double> shape;  // strokes of a letter, harmonics of a blob
+    std::vector<double> shape;  // strokes of a letter
+    std::vector<Wave> waves;    // of a surface
   };
   static Contact draw(int kind, const Objects& objects, const TaxelArray& array, const RandomStream& random,
                       std::uint64_t first);
+  static std::vector<Wave> draw_waves(double size, double pitch, double length, const RandomStream& random,
+                                      std::uint64_t first);
+  static std::vector<double> heights(const Contact& contact, double x0_mm, double y0_mm, const Field& field);
   static double inside_mm(const Contact& contact, double x_mm, double y_mm);
 
   std::vector<Contact> contacts_;

@@ -57,14 +57,19 @@ TEST(BodyFit, FindsKnownBodiesWithinTheStatedUncertainty) {
   EXPECT_GE(within, 0.8 * told) << told;
   EXPECT_LE(farther, 1);
 
-  // Once more with what was found: the rests are those of the recording still.
+  // Once more with what was found: the rests are those of the recording still, and so is a skin that was
+  // known.
   Sensor uneven = mat();
+  uneven.body.skin_mm = 6;
+  Recording touched = simulate_touching(uneven, 30, 5);
   uneven.rest.assign(60, 50);
-  Recording touched = simulate_touching(mat(), 30, 5);
   touched.metadata["rest"] = nlohmann::json(uneven.rest).dump();
   const BodyFit once = BodyFitter(uneven, 1)(touched), again = BodyFitter(once.sensor, 1)(touched);
   for (const float rest : once.sensor.rest) EXPECT_NEAR(rest, 50, 2);
   EXPECT_EQ(again.sensor, once.sensor);
+  EXPECT_EQ(once.sensor.body.skin_mm, 6);
+  EXPECT_FALSE(once.sensor.body.uncertainty.contains("skin_mm"));
+  EXPECT_EQ(once.lines()[1], "skin_mm 6.000 +- 0.00");
 
   Sensor slow = mat();
   slow.rate_hz = 1;

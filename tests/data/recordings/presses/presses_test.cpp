@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <set>
+#include <span>
 
 #include "data/recordings/felt_taxels.h"
 #include "data/recordings/presses/scene.h"
@@ -84,6 +84,41 @@ TEST(Presses, TheBodyDecides) {
             strongest(simulate_presses(mat(), {.kind = "bar", .count = 60}, 1)));
 }
 
+// Coarse surfaces touch in few patches, fine ones in many, each much or little; and of an array without a
+// skin each taxel shows the mean of the truth over its own square, as much stronger or weaker as the press
+// and the taxel are.
+TEST(Presses, SurfacesHaveEverySizeAndATaxelIsTheMeanOverItsSide) {
+  Sensor sensor = mat();
+  sensor.body = {.skin_mm = 0.01, .taxel_mm = 8, .knee = {}, .noise = 1e-6};
+  const auto edges_of = [&](const std::string& kind) {  // of a row, in the mean
+    const Recording r = simulate_presses(sensor, {.kind = kind, .count = 60}, 4);
+    double edges = 0, frames = 0, squares = 0, off = 0, least = 1, most = 0;
+    for (std::size_t f = 0; f < r.frames(); ++f) {
+      const auto truth = std::span(r.truth).subspan(f * 960, 960);
+      double touched = 0, load = 0, shown = 0;
+      std::vector<double> means(60);
+      for (std::size_t p = 0; p < 960; ++p) {
+        means[p / 160 * 10 + p % 40 / 4] += double{truth[p]} / 16;
+        touched += truth[p] > 0, edges += p % 40 > 0 && (truth[p] > 0) != (truth[p - 1] > 0);
+      }
+      if (touched == 0) continue;
+      ++frames, least = std::min(least, touched / 960), most = std::max(most, touched / 960);
+      for (std::size_t k = 0; k < 60; ++k)
+        load += means[k], shown += (double{r.volts[f * 60 + k]} - 40) / 860;
+      for (std::size_t k = 0; k < 60; ++k) {
+        const double difference = (double{r.volts[f * 60 + k]} - 40) / 860 * load / shown - means[k];
+        squares += means[k] * means[k], off += difference * difference;
+      }
+    }
+    EXPECT_LT(least, 0.25) << kind;
+    EXPECT_GT(most, 0.9) << kind;
+    EXPECT_LT(std::sqrt(off / squares), 0.07) << kind;  // of this 0.05 are the taxels' own
+    return edges / frames / 24;
+  };
+  EXPECT_GT(edges_of("surface1"), 8);
+  EXPECT_LT(edges_of("surface7"), 4);
+}
+
 TEST(Presses, ThreeAxesLeanAndRestInTheMiddle) {
   Sensor tip = mat(3, 3);
   tip.array.channels = 3;
@@ -100,7 +135,9 @@ TEST(Presses, ThreeAxesLeanAndRestInTheMiddle) {
       what_of<std::invalid_argument>([&] { simulate_presses(tip, {}, 1); }),
       "presses: expected an array of one channel or three axes, got 3x3 taxels at 8 mm with 2 channels");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { simulate_presses(mat(), {.kind = "cat"}, 1); }),
-            "presses: expected a kind of object (disc, bar, ring, edge, letter, blob, fingertip, mixed), got "
+            "presses: expected a kind of object (disc, bar, ring, edge, letter, fingertip, mixed, surface1, "
+            "surface2, "
+            "surface3, surface4, surface5, surface6, surface7), got "
             "'cat'");
 }
 
