@@ -4,10 +4,10 @@
     bench/sensors/few_shot.py BIN SETS_DIR OUT_DIR [SET ...]
 
 Groups are parted as in real_sensors.py (seed 0). What a pooled array is by its making - its taxels are means, no skin
-lies over them, they are linear and remember nothing - stands in the sensor's file; the rest is fitted to 1,600 frames of
-the groups that are not tested, without their truth. 2,000 presses are simulated, and preset `frame` learns these. Then
-1, 3 and 10 groups of real truth are learnt with them. Scores go to bench/results/few_shot.csv, beside two methods that
-learn nothing.
+lies over them, they are linear and remember nothing - stands in the sensor's file; the rest is fitted to 1,600 frames
+of the groups that are not tested, without their truth. 2,000 presses are simulated, and preset `frame` learns these.
+Then 1, 3 and 10 groups of real truth are learnt with them, twice as often. Scores go to bench/results/few_shot.csv,
+beside two methods that learn nothing.
 """
 import json
 import pathlib
@@ -25,6 +25,7 @@ from source import commit_of, keep, source
 KEPT = real_sensors.BENCH / "results" / "few_shot.csv"
 COLUMNS = ("set", "groups", "method", "frames", "ssim", "psnr_db", "peak_ssim", "peak_psnr_db", "contact_ssim",
            "contact_psnr_db", "command", "commit")
+REAL = 2  # frames of real truth, repeated, for each simulated one
 BODY = {"taxel_mm": 1, "skin_mm": 0.01, "knee": 1000, "hysteresis_s": 1e-4}
 TOUCHED, PRESSES, EPOCHS, RATE_HZ = 1600, 2000, 4, 40  # sizes are in pitches: 1 mm stands for whichever it is
 
@@ -64,9 +65,15 @@ class Study:
         where = self.out / f"groups_{groups}"
         names = sorted({one.group for one in self.train})
         chosen = np.random.default_rng(1).permutation(names)[:groups]
-        sets.write([one for one in self.train if one.group in chosen], self.scale, 1, where / "train")
+        real, simulated = [one for one in self.train if one.group in chosen], PRESSES * 6
+        sets.write(real, self.scale, 1, where / "real")
+        (where / "train").mkdir()
         for one in (self.out / "simulated").glob("*.safetensors"):
             (where / "train" / one.name).hardlink_to(one)
+        frames = sum(len(one.frames) for one in real)
+        for again in range(max(1, round(REAL * simulated / frames)) if real else 0):
+            for one in (where / "real").glob("*.safetensors"):
+                (where / "train" / f"{again}_{one.name}").hardlink_to(one)
         if not (self.out / "test").exists():
             sets.write(self.test, self.scale, 1, self.out / "test")
         model, outputs = where / "model.safetensors", where / "outputs.safetensors"
@@ -82,7 +89,7 @@ class Study:
             name = method.__name__.replace("_", "-")
             yield 0, name, real_sensors.scores(self.name, method(frames, self.scale), self.test)
         self.simulate()
-        for groups in (0, 1, 3, 10):
+        for groups in (0, 10, 3, 1):
             if groups <= len({one.group for one in self.train}):
                 yield groups, "network", self.network(groups)
 
