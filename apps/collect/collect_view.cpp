@@ -1,7 +1,6 @@
 #include "apps/collect/collect_view.h"
 
 #include <signal.h>
-#include <unistd.h>
 
 #include <algorithm>
 
@@ -20,7 +19,7 @@ constexpr int kWidth = static_cast<int>(rig::kPlateWidthMm), kLength = static_ca
 
 // A run that lifts the finger is under way after the first wish; a second one would end it at once.
 std::string stop_as_ctrl_c() {
-  if (!interrupted()) kill(getpid(), SIGINT);
+  if (!interrupted()) raise(SIGINT);  // on this thread: heard before a second press is
   return "the finger is lifted and the run ends; what was collected is kept";
 }
 

@@ -6,7 +6,6 @@
 #include <netinet/in.h>
 #include <pthread.h>
 #include <sys/random.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -32,7 +31,6 @@ constexpr unsigned kConnections = WebServer::kMostPeers + 56;  // those that are
 constexpr std::size_t kRequestBytes = 16 << 10;  // memory of a connection; more than that gets 431
 constexpr int kSendBuffer = 64 << 10;            // what a stalled page may leave unread, and show late
 constexpr double kStillHereS = 1;
-constexpr int kNice = 5;
 constexpr std::string_view kPolicy =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; worker-src 'self'; "
     "connect-src 'self'; "
@@ -321,11 +319,11 @@ void WebServer::make_room() {
   }
 }
 
-// A page may come late, a frame may not: this thread yields to the others.
+// A page may come late, a frame may not: this thread leaves a priority to the others. Stop may not either, so
+// that it stands behind nobody else.
 void WebServer::run() {
   const sched_param none{};
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &none);
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
   double due = seconds_now();
   while (!stop_) {
     const double now = seconds_now();

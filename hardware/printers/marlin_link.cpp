@@ -54,8 +54,9 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
   Exchange exchange{number_, number_, deadline_s > 0 ? deadline_s : kOkDeadline};
   exchange.code = text;
   exchange.once = capabilities_.klipper && code.starts_with("G1 ");
+  exchange.answer.repeated = owed_ > 0;  // and an ok may have been lost
   exchange.answer.sent_s = lines_.send(kept_.back());
-  unanswered_ = true;
+  ++owed_;
   exchange.until = exchange.answer.sent_s + exchange.deadline_s;
   // Behind its deadline a long command may still have to be asked for.
   const double usual_s = deadline_s > kOkDeadline ? deadline_s : 0;
@@ -75,7 +76,7 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
     ++counters_.timeouts;
     exchange.once ? give_back(exchange) : ask(exchange);
   }
-  unanswered_ = false;
+  owed_ = 0;
   finish(exchange);
   if (exchange.proven && deadline_s > kOkDeadline) {
     // Taken is not finished: the ok of a command behind it in the queue tells when a long one has ended.
@@ -133,7 +134,7 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
   if (capabilities_.klipper && of_lines) return;
   switch (reply.kind) {
     case ReplyKind::ok:
-      on_ok(exchange);
+      if (owed_ == 0) on_ok(exchange);
       if (reply.text.size() > 2) exchange.answer.replies.push_back(std::move(reply));  // Klipper's M115
       break;
     case ReplyKind::paused:
@@ -241,15 +242,15 @@ void MarlinLink::on_last_line(Exchange& exchange, std::int64_t last) {
 
 void MarlinLink::emergency(std::string_view code) { lines_.send("\n" + std::string(code) + "\n"); }
 
-void MarlinLink::abandon(int more, double seconds) {
+void MarlinLink::stop() {
+  emergency("M410");
+  ++owed_;
+}
+
+void MarlinLink::abandon(double seconds) {
   const double until = lines_.port().now() + seconds;
   std::string line;
-  for (int oks = more + (unanswered_ ? 1 : 0); oks > 0 && read_line(until, line);) {
-    const Reply reply = parse_reply(line);
-    check_alarm(reply);
-    oks -= reply.kind == ReplyKind::ok ? 1 : 0;
-  }
-  unanswered_ = false;
+  while (owed_ > 0 && read_line(until, line)) check_alarm(parse_reply(line));
   settle();
 }
 
@@ -271,10 +272,14 @@ void MarlinLink::settle() {
     if (!report) quiet_until = lines_.arrival_s() + kQuiet;
   }
   lines_.forget();
+  owed_ = 0;
 }
 
 void MarlinLink::check_alarm(const Reply& reply) {
-  if (reply.kind == ReplyKind::ok) complaint_.clear();
+  if (reply.kind == ReplyKind::ok) {
+    complaint_.clear();
+    owed_ -= owed_ > 0 ? 1 : 0;
+  }
   for (const char* mark : {"echo:", "// ", "!! ", "Error:"}) {
     // Klipper says the cause first, and then at length what may be done.
     const bool stands = complaint_.starts_with("// ") || complaint_.starts_with("!! ");

@@ -65,9 +65,12 @@ class MarlinLink {
   /// From now on a pause ends no wait: it is answered by M108, and the wait goes on.
   void answer_pauses() { answers_pauses_ = true; }
 
-  /// After a command that an exception interrupted, and after `more` unnumbered ones: reads until all have
-  /// been acknowledged, `seconds` at most, so that no later command takes their ok for its own.
-  void abandon(int more, double seconds);
+  /// M410, after a command that an exception interrupted. The next command may be sent at once: it waits in
+  /// the firmware for the end of the stop, and takes neither of the two oks before its own.
+  void stop();
+
+  /// After a command that an exception interrupted: reads until it has been acknowledged, `seconds` at most.
+  void abandon(double seconds);
 
   /// From this time of the port's clock on every wait throws PrinterSilent, which bounds a whole run.
   void give_up_at(double time_s) { give_up_s_ = time_s; }
@@ -124,7 +127,7 @@ class MarlinLink {
   double give_up_s_ = std::numeric_limits<double>::infinity();
   bool connected_ = false;
   bool halted_ = false;
-  bool unanswered_ = false;  // the newest line
+  int owed_ = 0;  // oks of what has been sent
   bool answers_pauses_ = false;
 };
 

@@ -269,9 +269,7 @@ void Printer::raise(const Point3& from, double z) {
 
 void Printer::lift_out(double z) {
   const bool stops = link_.capabilities().quick_stop();
-  constexpr double kHeldByStop = 1.3;  // M410 holds Marlin for a second
-  if (stops) link_.emergency("M410");
-  link_.abandon(stops ? 1 : 0, stops ? kHeldByStop : longest_s());
+  stops ? link_.stop() : link_.abandon(longest_s());
   raise(stops ? Point3{target_.x, target_.y, limits_.low.z} : agreed_position(), std::min(z, limits_.high.z));
   link_.command("M400", longest_s());
   const Point3 found = agreed_position();

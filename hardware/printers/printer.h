@@ -77,8 +77,8 @@ class Printer {
   Stop quick_stop();
   /// M112: kills the firmware; afterwards only a reset helps.
   Stop emergency_stop();
-  /// The way out of contact: stops a firmware that has a quick stop, and raises the finger to `z` before
-  /// anything is asked. Throws when that could not be verified.
+  /// The way out of contact: stops a firmware that has a quick stop, and raises the finger to `z`, before
+  /// anything is asked or waited for. Throws when that could not be verified.
   void lift_out(double z);
 
   const Point3& target() const { return target_; }

@@ -111,14 +111,15 @@ class Link {
     }).finally(() => this.answers.delete(id));
   }
 
-  // The program's answer, or why there is none. `wanted` (n): whether to try again, the other way, after n attempts; the
-  // first are short, for a connection may be dead and a new one is not.
+  // The program's answer, or why there is none. `wanted` (n): whether to try again after n attempts; each goes both ways at
+  // once, and the first are short, for a connection may be dead and a new one is not.
   async act(action, wanted) {
     for (let n = 1;; ++n) {
       const begin = performance.now();
       try {
-        return await this.ask(action, n % 2 ? "worker" : "page", wanted ? Math.min(ACTION_MS, 400 * n) : ACTION_MS);
-      } catch (error) {
+        const limit = wanted ? Math.min(ACTION_MS, 400 * n) : ACTION_MS, ways = wanted ? ["worker", "page"] : ["worker"];
+        return await Promise.any(ways.map((way) => this.ask(action, way, limit)));
+      } catch ({errors: [error]}) {
         if (!wanted || !wanted(n)) return "the program did not answer: " + error.message;
       }
       await new Promise((done) => setTimeout(done, Math.max(0, begin + 300 - performance.now())));

@@ -61,7 +61,7 @@ class Sleeper:
 
 
 class PrinterTap:
-    """Between program and printer: when the last lift went through."""
+    """Between program and printer: when the stop and the lift behind it went through, and when the planner had the lift."""
 
     def __init__(self, inner, link):
         import pty
@@ -72,19 +72,26 @@ class PrinterTap:
         os.symlink(os.ttyname(terminal), link)
         self.inner = os.open(inner, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(self.inner)
-        self.answers, self.lifting_s, self.slides, self.running = [], None, 0, True
-        self.lift_line, self.terminal = False, terminal
+        self.times, self.slides, self.owed, self.terminal = {}, 0, 0, terminal
         for a, b in ((self.end, self.inner), (self.inner, self.end)):
             threading.Thread(target=self.pump, args=(a, b), daemon=True).start()
 
     def pump(self, a, b):
         with contextlib.suppress(OSError):
             while data := os.read(a, 4096):
-                if a == self.end:
+                now = time.monotonic()
+                if a == self.end and "lift" not in self.times:
                     self.slides += len(re.findall(rb"G1 X\S+ Y209", data))
-                    self.lift_line = self.lift_line or b" G1 Z" in data
-                elif self.lift_line and self.lifting_s is None and b"ok" in data:
-                    self.lifting_s = time.monotonic()  # the planner has it; the head starts 0.11 s later
+                    before, lift, _ = data.partition(b" G1 Z")
+                    self.owed += len(re.findall(rb"[^\n]\n", before)) + (lift != b"")
+                    if b"M410" in before:
+                        self.times["stop"] = now
+                    if lift:
+                        self.times["lift"] = now
+                elif a == self.inner:
+                    self.owed -= data.count(b"ok\n")
+                    if "lift" in self.times and self.owed <= 0:
+                        self.times.setdefault("taken", now)  # the head starts 0.11 s later
                 os.write(b, data)
 
 
@@ -100,7 +107,7 @@ def lamp(browser):
 
 
 def one_stop(binaries, folder, browsers, number, dice):
-    """Returns how long after the click the finger was a millimetre up, and what the page said."""
+    """Returns how long after the click stop and lift passed and the printer had taken the lift, and how the program ended."""
     with contextlib.ExitStack() as stack:
         home = folder / str(number)
         home.mkdir()
@@ -131,14 +138,14 @@ def one_stop(binaries, folder, browsers, number, dice):
         browser.call("POST", "/window", {"handle": handle})
         clicked = browser.js("document.getElementById('stop').click(); return 1") and time.monotonic()
         program.wait(30)
-        took = tap.lifting_s - clicked + 0.107 + 0.2 if tap.lifting_s else float("inf")  # 1 mm at 5 mm/s
+        parts = [tap.times.get(part, float("inf")) - clicked for part in ("stop", "lift", "taken")]
         said = r"the finger (was|is) lifted" if number % 2 else "the finger was lifted"  # the end may come before a new connection
         wait_until("its outcome", lambda: re.search(said, browser.js("return document.getElementById('said').textContent")), 10)
         for other, old in tabs:
             other.call("POST", "/window", {"handle": old})
             other.call("DELETE", "/window")
             other.call("POST", "/window", {"handle": other.first})
-        return took, program.returncode
+        return parts, program.returncode
 
 
 def main():
@@ -154,10 +161,12 @@ def main():
         for browser in browsers:
             browser.first = browser.call("GET", "/window")
         for number in range(repetitions):
-            took, code = one_stop(binaries, pathlib.Path(name), browsers, number, dice)
+            parts, code = one_stop(binaries, pathlib.Path(name), browsers, number, dice)
             assert code == 130, code
+            took = parts[-1] + 0.107 + 0.2  # the head starts; 1 mm at 5 mm/s
             worst, late = max(worst, took), late + (took > WITHIN_S)
-            print(f"{number}: {'a slept browser' if number % 2 else 'both awake'}, finger up {took:.2f} s after the click", flush=True)
+            print(f"{number}: {'a slept browser' if number % 2 else 'both awake'}, finger up {took:.2f} s after the click; "
+                  + ", ".join(f"{name} {s:.3f}" for name, s in zip(("stop", "lift", "taken"), parts)), flush=True)
     print(f"{repetitions} stops in {2 * TABS} tabs: finger up within {worst:.2f} s, {late} later than {WITHIN_S:.0f} s")
     return 0 if worst < 10 else 1
 
