@@ -10,11 +10,12 @@
 namespace supertac {
 namespace {
 
-enum Dialect : unsigned { marlin = 1, klipper = 2, reprap = 4 };
+enum class Dialect { marlin, klipper };
+using enum Dialect;
 
 struct StateRule {
   const char* state;  // its name, for people
-  unsigned dialects;
+  Dialect dialect;
   const char* set;     // the command that gives the wanted value; empty: only the owner can
   const char* read;    // the one whose answer tells it; empty: none does
   const char* label;   // what stands before the value in that answer
@@ -33,38 +34,28 @@ constexpr const char* kByHand = "set it by hand and start again";
 constexpr StateRule kRules[] = {
     {"state of another job", klipper, "SAVE_GCODE_STATE NAME=supertac", "", "", "",
      "RESTORE_GCODE_STATE NAME=supertac", ""},
-    {"state of another job", reprap, "M120", "", "", "", "M121", ""},
     {"unit of lengths", marlin, "G21", "M503", "  G2", "1", "G20", kByHand},
-    {"unit of lengths", klipper | reprap, "G21", "", "", "", nullptr, ""},
+    {"unit of lengths", klipper, "G21", "", "", "", nullptr, ""},
     {"absolute positions", marlin, "G90", "", "", "", "", ""},
-    {"absolute positions", klipper | reprap, "G90", "", "", "", nullptr, ""},
-    {"feed rate a minute", reprap, "G94", "", "", "", nullptr, ""},
+    {"absolute positions", klipper, "G90", "", "", "", nullptr, ""},
     {"plane", marlin, "G17", "", "", "", "", ""},
-    {"plane", reprap, "G17", "", "", "", nullptr, ""},
     {"workspace", marlin, "G53", "", "", "", "", ""},
-    {"workspace", reprap, "G54", "", "", "", "", ""},
     {"speed factor", marlin, "M220 S100", "M220", "FR:", "100", "M220 S?", kByHand},
-    {"speed factor", reprap, "M220 S100", "M220", "override: ", "100.0", "M220 S?", kByHand},
     {"speed factor", klipper, "M220 S100", "", "", "", nullptr, ""},
     {"flow factor", marlin, "M221 S100", "M221", "Flow: ", "100", "M221 S?", ""},
     {"flow factor", klipper, "M221 S100", "", "", "", nullptr, ""},
-    {"flow factor", reprap, "M221 S100", "", "", "", "", ""},
     {"reports of position", marlin, "M154 S0", "", "", "", "", ""},
     {"reports of temperature", marlin, "M155 S0", "", "", "", "", ""},
     {"mesh compensation", marlin, "M420 S0", "M420", "Bed Leveling ", "OFF", "M420 S1", kByHand},
     {"mesh compensation", klipper, "BED_MESH_CLEAR", "BED_MESH_PROFILE SAVE=supertac", "profile [supertac]",
      ", the bed has not been probed", "BED_MESH_PROFILE LOAD=supertac;BED_MESH_PROFILE REMOVE=supertac", ""},
-    {"mesh compensation", reprap, "G29 S2", "M409 K\"move.compensation.type\"", "\"result\":", "\"none\"}",
-     "G29 S1", kByHand},
     {"offset of the coordinates", klipper, "SET_GCODE_OFFSET X=0 Y=0 Z=0", "GET_POSITION",
      "gcode homing: ", "X:0.000000 Y:0.000000 Z:0.000000", "", kByHand},
     {"home offset (M206)", marlin, "", "M503", "M206 X", "0.00 Y0.00 Z0.00", "",
      "set it to 0 (M206 X0 Y0 Z0), or confirm the origin instead of homing", true},
 };
 
-unsigned dialect_of(const MarlinCapabilities& firmware) {
-  return firmware.klipper ? klipper : firmware.reprap ? reprap : marlin;
-}
+Dialect dialect_of(const MarlinCapabilities& firmware) { return firmware.klipper ? klipper : marlin; }
 
 /// Nothing where the firmware does not know the command.
 std::optional<MarlinLink::Answer> run(MarlinLink& link, const std::string& command) {
@@ -117,9 +108,9 @@ std::string filled(std::string text, const std::string& value) {
 }  // namespace
 
 void MachineState::set(MarlinLink& link, bool homed) {
-  const unsigned dialect = dialect_of(link.capabilities());
+  const Dialect dialect = dialect_of(link.capabilities());
   for (const StateRule& rule : kRules) {
-    if ((rule.dialects & dialect) == 0 || (rule.homed && !homed)) continue;
+    if (rule.dialect != dialect || (rule.homed && !homed)) continue;
     const std::string set = rule.set, read = rule.read, wanted = rule.wanted;
     const std::string name = rule.state + (" (" + set + ")");
     const auto known = std::ranges::find(changed_, name, &Changed::name);

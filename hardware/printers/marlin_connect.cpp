@@ -66,13 +66,17 @@ void MarlinLink::nobody_answered() {
   throw PrinterSilent(expected + "no" + within + "check that the printer is on and the port is right");
 }
 
+void MarlinLink::refuse(const std::string& firmware, const std::string& why) const {
+  throw WrongDevice("port " + lines_.name() + ": expected Marlin or Klipper, found " + firmware + ", which " +
+                    why + "; use a printer with one of the two");
+}
+
 // GRBL answers "error:20" and "ALARM:1"; Marlin's errors are words.
 void MarlinLink::refuse_grbl(const std::string& line) const {
   const bool numbered = line.starts_with("error:") || line.starts_with("ALARM:");
   if (!line.starts_with("Grbl ") && !(numbered && line.size() > 6 && line[6] >= '0' && line[6] <= '9'))
     return;
-  throw WrongDevice("port " + lines_.name() + ": expected Marlin or Klipper, found GRBL (" + in_quotes(line) +
-                    "), which has no line numbers and no M400; use a printer with one of the two");
+  refuse("GRBL (" + in_quotes(line) + ")", "has no line numbers and no M400");
 }
 
 void MarlinLink::refuse_sensor() const {
@@ -114,7 +118,9 @@ void MarlinLink::read_capabilities() {
       if (reply.text == "Cap:EMERGENCY_PARSER:1") capabilities_.emergency_parser = true;
     }
     capabilities_.klipper = capabilities_.firmware.starts_with("Klipper");
-    capabilities_.reprap = capabilities_.firmware.starts_with("RepRapFirmware");
+    if (capabilities_.firmware.starts_with("RepRapFirmware"))
+      refuse("RepRapFirmware",
+             "says ok to a line that a cable has damaged, and has no M410 to stop in contact");
     known = known || !capabilities_.quick_stop();
   }
 }

@@ -121,7 +121,6 @@ void MarlinLink::repeat(Exchange& exchange, const std::string& why) {
 }
 
 void MarlinLink::ask(Exchange& exchange) {
-  if (capabilities_.reprap) return repeat(exchange, "no answer");  // targets are absolute: twice is once
   count_copy(exchange, "no answer");
   exchange.asked = !capabilities_.klipper;
   exchange.until = kOkDeadline + lines_.send("\n" + numbered_line(number_ + kFarAhead, "M105"));
@@ -159,7 +158,7 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
       break;
     case ReplyKind::error:
       exchange.error = reply.text;
-      // Klipper and RepRapFirmware complain of what they have read right, once.
+      // Klipper complains of what it has read right, once.
       (capabilities_.quick_stop() ? exchange.fault : exchange.error_stands) = true;
       break;
     case ReplyKind::wait:

@@ -24,8 +24,7 @@ struct MarlinCapabilities {
   std::string firmware;           ///< the text of FIRMWARE_NAME, empty when not told
   bool emergency_parser = false;  ///< M112, M410 act ahead of the queue
   bool klipper = false;           ///< no line is ever asked for again, no M410, no M114 R
-  bool reprap = false;            ///< RepRapFirmware: drops damaged lines without a word, no M410
-  bool quick_stop() const { return !klipper && !reprap; }
+  bool quick_stop() const { return !klipper; }
 };
 
 class MarlinLink {
@@ -49,7 +48,7 @@ class MarlinLink {
 
   /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, reads M115; waits for a
   /// Klipper that still starts. Throws PrinterSilent; WrongDevice when what comes is no such firmware's
-  /// answer (a GRBL controller is named); PrinterHalted.
+  /// answer (GRBL and RepRapFirmware are named); PrinterHalted.
   void connect();
 
   /// Runs one command and returns when the firmware has acknowledged it. `deadline_s` 0: 2.5 s;
@@ -97,6 +96,7 @@ class MarlinLink {
 
   bool probe(double until);
   [[noreturn]] void nobody_answered();
+  [[noreturn]] void refuse(const std::string& firmware, const std::string& why) const;
   void refuse_grbl(const std::string& line) const;
   void refuse_sensor() const;
   void read_capabilities();

@@ -69,6 +69,14 @@ TEST(MachineState, WhatStaysAnotherIsRefusedByName) {
       "by hand");
 }
 
+TEST(MachineState, RepRapFirmwareIsRefusedByName) {
+  const std::vector<Tampering::Change> named(
+      2, {"FIRMWARE_NAME:Marlin 2.1.2", "FIRMWARE_NAME: RepRapFirmware for Duet 2 WiFi/Ethernet"});
+  EXPECT_ERROR(
+      PrinterBench(running_rig(), named), WrongDevice,
+      "expected Marlin or Klipper, found RepRapFirmware, which says ok to a line that a cable has damaged");
+}
+
 TEST(MachineState, AHomeOffsetIsRefusedByNameWhereItShiftsTheBed) {
   PrinterBench bench(running_rig({.left_over = {.home_offset = {0, 0, -1.25}}}));
   EXPECT_ERROR(bench.printer.home(), PrinterRefused, "home offset (M206)");
