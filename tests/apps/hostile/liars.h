@@ -15,7 +15,8 @@ std::map<std::string, std::uint64_t> lying_files(const std::string& folder, std:
                                                  std::uint64_t seed);
 
 /// `n` collections in simulated time. Counts "collections", "complete", "typed errors" and "broken promises":
-/// those of run_faulty_collection(), and that the end comes within an hour of the rig's.
+/// those of run_faulty_collection(), that the end comes within an hour of the rig's, and that Stop on a page
+/// is heard once, within 2 s, whatever other tabs do.
 std::map<std::string, std::uint64_t> lying_devices(std::uint64_t n, std::uint64_t seed);
 
 }  // namespace supertac
