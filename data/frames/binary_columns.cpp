@@ -22,7 +22,7 @@ double bits_of_share(double a, double b) {
 
 namespace {
 
-constexpr std::size_t kClasses = 34;
+constexpr std::size_t kClasses = BinaryColumns::kClasses;
 constexpr double kMostExceptions = 0.2;  // of a constant, a counter or a clock: bytes may have been lost
 
 // What is odd in a column comes in runs, as damage and restarts do: bits of where they begin and end, and of
@@ -47,18 +47,21 @@ class Exceptions {
   bool before_ = false;
 };
 
-// Code length of steps of these classes, each as often as it is expected after those before, and within it.
-// That nothing ever moves is coded with the array.
-double bits_of_steps(const std::array<std::size_t, kClasses>& counts, std::size_t classes,
-                     std::size_t steps) {
-  if (counts[0] == steps) return 0;
-  const double share = 1.0 / static_cast<double>(classes);
-  double bits = log2_gamma(static_cast<double>(steps) + 1);
-  for (std::size_t c = 0; c < classes; ++c)
+// Code length of numbers of these classes, each as often as it is expected after those before, and within it.
+// It knows no type: of what width numbers are must not tell how they move.
+using Classes = std::array<std::size_t, kClasses>;
+double bits_of_classes(const Classes& counts, std::size_t all) {
+  const double share = 1.0 / kClasses;
+  double bits = log2_gamma(static_cast<double>(all) + 1);
+  for (std::size_t c = 0; c < kClasses; ++c)
     if (counts[c] > 0)
       bits += log2_gamma(share) - log2_gamma(static_cast<double>(counts[c]) + share) +
               static_cast<double>(counts[c] * c);
   return bits;
+}
+// That nothing ever moves is coded with the array.
+double bits_of_steps(const Classes& counts, std::size_t steps) {
+  return counts[0] == steps ? 0 : bits_of_classes(counts, steps);
 }
 
 // A sensor's numbers lie within 24 powers of two from 1; each beyond costs a bit.
@@ -90,27 +93,39 @@ std::int64_t ordinal_of_real(std::uint32_t bits) {
 struct Column {
   double steps = 0, alone = 0, size = 0;
   std::int64_t middle = 0;
-  bool still = false, sign = false, began_signed = true;
+  bool still = false, high = false, highs = false;  // its highest bit is set at times, in several numbers
 };
 template <class Unsigned, class Ordinal>
 Column column_of(const unsigned char* first, std::size_t stride, std::size_t steps, bool big_endian,
-                 const Ordinal& ordinal) {
+                 const Ordinal& ordinal, bool two_levels = false) {
   constexpr std::size_t kBits = 8 * sizeof(Unsigned);
-  std::array<std::size_t, kClasses> counts{};
+  // Far is far.
+  const auto class_of = [](std::int64_t step) {
+    const int size = std::bit_width(static_cast<std::uint64_t>(std::abs(step)));
+    return size + 2 > static_cast<int>(kBits) ? kBits : static_cast<std::size_t>(size);
+  };
+  Classes counts{}, on_level{};
   Column column{.middle = ordinal(load<Unsigned>(first + steps / 2 * stride, big_endian))};
-  std::int64_t before = ordinal(load<Unsigned>(first, big_endian));
+  std::int64_t before = ordinal(load<Unsigned>(first, big_endian)), levels[2] = {before, before};
+  double turns[2][2] = {};
+  bool high_before = false;
   for (std::size_t k = 0; k <= steps; ++k) {
     const auto bits = load<Unsigned>(first + k * stride, big_endian);
-    const bool sign = bits >> (kBits - 1) != 0;
-    column.sign = column.sign || sign;
-    if (k < 3) column.began_signed = column.began_signed && sign;
+    const bool high = bits >> (kBits - 1) != 0;
     const std::int64_t now = ordinal(bits);
-    const int size = std::bit_width(static_cast<std::uint64_t>(std::abs(now - before)));
-    // Far is far.
-    if (k > 0) ++counts[size + 2 > static_cast<int>(kBits) ? kBits : static_cast<std::size_t>(size)];
-    before = now;
+    column.highs = column.highs || (high && column.high && now != levels[1]);
+    column.high = column.high || high;
+    if (k > 0)
+      ++counts[class_of(now - before)], ++on_level[class_of(now - levels[high])], ++turns[high_before][high];
+    before = levels[high] = now, high_before = high;
   }
-  column.steps = bits_of_steps(counts, kBits + 2, steps), column.still = counts[0] == steps;
+  column.steps = bits_of_steps(counts, steps), column.still = counts[0] == steps;
+  // Saturation and glitches of unsigned bytes are jumps between two levels, and back; read as signed they
+  // would look like small steps across 0.
+  if (two_levels && column.high)
+    column.steps = std::min(column.steps,
+                            static_cast<double>(kBits) + bits_of_share(turns[0][0], turns[0][1]) +
+                                bits_of_share(turns[1][0], turns[1][1]) + bits_of_classes(on_level, steps));
   column.alone = std::log2(kBits + 1.0) + std::bit_width(static_cast<std::uint64_t>(std::abs(column.middle)));
   column.size = bits_of_size(static_cast<double>(column.middle));
   return column;
@@ -130,20 +145,19 @@ void look_at_multiples(Column& column, const unsigned char* first, std::size_t s
     const auto mantissa = (std::bit_cast<std::uint32_t>(value(k)) & 0x7FFFFF) | 0x800000;
     finest = std::min(finest, std::max(std::ilogb(value(k)) - 23, -149) + std::countr_zero(mantissa));
   }
-  std::array<std::size_t, kClasses> counts{};
+  Classes counts{};
   for (std::size_t k = 1; k <= steps; ++k) {
     const double n = finite(k) && finite(k - 1)
                          ? std::ldexp(std::abs(double{value(k)} - double{value(k - 1)}), -finest)
                          : std::ldexp(1.0, 32);
     ++counts[n < 1 ? 0 : std::min<std::size_t>(static_cast<std::size_t>(std::ilogb(n)) + 1, 32)];
   }
-  column.steps = std::min(column.steps, bits_of_steps(counts, kClasses, steps));
+  column.steps = std::min(column.steps, bits_of_steps(counts, steps));
 }
 
-// Bits of how far a number is from the one before it in the frame.
-double apart(const Column& a, const Column& b, std::size_t bits) {
-  return std::log2(static_cast<double>(bits + 1)) +
-         std::bit_width(static_cast<std::uint64_t>(std::abs(a.middle - b.middle)));
+// Of a clock that sends seconds as a real number.
+std::uint64_t microseconds(double seconds) {
+  return seconds >= 0 && seconds < 1e10 ? static_cast<std::uint64_t>(std::llround(1e6 * seconds)) : 0;
 }
 
 }  // namespace
@@ -178,7 +192,7 @@ void BinaryColumns::find_values() {
       look_at_multiples(column, first, period, steps_, big);
       return column;
     }
-    return type == "u8"    ? column_of<std::uint8_t>(first, period, steps_, big, ordinal<std::uint8_t>)
+    return type == "u8"    ? column_of<std::uint8_t>(first, period, steps_, big, ordinal<std::uint8_t>, true)
            : type == "i8"  ? column_of<std::uint8_t>(first, period, steps_, big, ordinal<std::int8_t>)
            : type == "u16" ? column_of<std::uint16_t>(first, period, steps_, big, ordinal<std::uint16_t>)
            : type == "i16" ? column_of<std::uint16_t>(first, period, steps_, big, ordinal<std::int16_t>)
@@ -193,14 +207,17 @@ void BinaryColumns::find_values() {
       std::vector<Column> columns(period);
       for (std::size_t c = 0; c < period; ++c) {
         columns[c] = read(type, at(0, c), big);
-        v.sign.push_back(columns[c].sign), v.rests_signed.push_back(columns[c].began_signed);
-        v.first.push_back(columns[c].alone + columns[c].size + columns[c].steps);
+        v.high.push_back(columns[c].high), v.highs.push_back(columns[c].highs || columns[c].still);
+        v.alone.push_back(columns[c].alone);
+        v.random.push_back(columns[c].steps > static_cast<double>(8 * width * steps_));
       }
       for (std::size_t c = 0; c < 2 * period; ++c) {
         const Column &here = columns[c % period], &before = columns[(c + period - width) % period];
-        v.behind.push_back(here.steps + here.size + apart(here, before, 8 * width) +
-                           (c >= width ? v.behind[c - width] : 0));
+        v.moves.push_back(here.steps + here.size + (c >= width ? v.moves[c - width] : 0));
         v.still.push_back((here.still ? 1 : 0) + (c >= width ? v.still[c - width] : 0));
+        v.apart.push_back(c >= width ? v.apart[c - width] : std::array<std::uint16_t, kClasses>{});
+        const auto away = static_cast<std::uint64_t>(std::abs(here.middle - before.middle));
+        ++v.apart.back()[static_cast<std::size_t>(std::bit_width(away))];
       }
       values_.push_back(std::move(v));
     }
@@ -208,19 +225,28 @@ void BinaryColumns::find_values() {
 
 double BinaryColumns::Values::bits(std::size_t at, std::size_t count) const {
   const std::size_t end = at + (count - 1) * width;
-  const double still_ones = still[end] - (at >= width ? still[at - width] : 0);
-  return first[at] + behind[end] - behind[at] +
-         bits_of_share(still_ones, static_cast<double>(count) - still_ones);
+  const auto sum_of = [&](const std::vector<double>& sums) {
+    return sums[end] - (at >= width ? sums[at - width] : 0);
+  };
+  Classes classes{};
+  for (std::size_t c = 0; c < kClasses; ++c)
+    classes[c] = static_cast<std::size_t>(apart[end][c] - apart[at][c]);
+  // One in the middle is told first, and from it the others, for what stands at an edge may be no value.
+  return alone[(at + count / 2 * width) % alone.size()] + sum_of(moves) +
+         bits_of_classes(classes, count - 1) +
+         bits_of_share(sum_of(still), static_cast<double>(count) - sum_of(still));
 }
 
-void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_endian, double seconds) {
-  const std::string type = "u" + std::to_string(8 * width);
+void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_endian, double seconds,
+                                bool real) {
+  const std::string type = (real ? "f" : "u") + std::to_string(8 * width);
   const auto* first = at(0, column);
   const auto number = [&](std::size_t k) {
     const auto* from = first + k * stretch_.period;
     return width == 1   ? std::uint64_t{*from}
            : width == 2 ? std::uint64_t{load<std::uint16_t>(from, big_endian)}
            : width == 4 ? std::uint64_t{load<std::uint32_t>(from, big_endian)}
+           : real       ? microseconds(std::bit_cast<double>(load<std::uint64_t>(from, big_endian)))
                         : load<std::uint64_t>(from, big_endian);
   };
   const std::uint64_t mask = width == 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << 8 * width) - 1;
@@ -237,11 +263,11 @@ void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_
     return;
   }
   // Its lowest byte moves; and it began in a year that a computer knows.
-  if (width == 1 || constant(big_endian ? column + width - 1 : column) < kNever) return;
+  if (width == 1 || (!real && constant(big_endian ? column + width - 1 : column) < kNever)) return;
   // A clock goes on, evenly but for a few steps, and about as fast as the host's.
   const double usual = median(std::vector<double>(steps));
   if (usual < 1 || usual > std::min(static_cast<double>(mask) / 4, 1e9)) return;
-  std::array<std::size_t, kClasses> counts{};
+  Classes counts{};
   double went = 0;
   Exceptions jumps;
   for (const double step : steps) {
@@ -252,17 +278,16 @@ void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_
     ++counts[jump ? 0 : std::bit_width(static_cast<std::uint64_t>(away))];
   }
   if (went <= 0 || jumps.too_many()) return;
-  const double mean = went / static_cast<double>(steps_);
+  const double mean = went / static_cast<double>(steps_), where = begin + std::log2(8.0 * 8),
+               pace = std::bit_width(static_cast<std::uint64_t>(usual));
   FieldFound found{{FrameField::Is::time, 0, ""},
                    {.type = type},
                    width,
-                   (width == 4   ? 4
-                    : width == 2 ? 12
-                                 : 6) +
-                       2 * begin + jumps.bits(2 * begin) + bits_of_steps(counts, kClasses, steps_)};
+                   (width == 4 ? 4 : 8) + where + pace + jumps.bits(where) + bits_of_steps(counts, steps_)};
   double best = kNever, second = kNever;
   for (const double unit : {1e-3, 1e-6}) {
     const double rate = 1 / (mean * unit), ratio = went * unit / std::max(seconds, 1e-9);
+    if (real && unit > 1e-6) continue;
     if (rate < 0.3 || rate > 50'000 || static_cast<double>(number(0)) * unit > 1e10) continue;
     double odds = std::pow(std::log10(rate / 100), 2);  // frames come 10 to 1000 times a second
     if (seconds >= kAtOnceS) odds = ratio > 0.75 && ratio < 1.25 ? 0 : kNever;
@@ -271,10 +296,15 @@ void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_
     else
       second = std::min(second, odds);
   }
-  found.sure = second - best > 3;
   if (best == kNever) {  // linear, but in no unit that is known
-    found.field = {FrameField::Is::skip, width, ""}, found.time = {}, found.bits += 20, found.sure = true;
+    fields_[column].push_back({{FrameField::Is::skip, width, ""}, {}, width, found.bits + 20});
+    return;
   }
+  found.sure = second - best > 3;
+  // Clocks count from when a sensor was switched on: with each doubling past an hour fewer have run so long.
+  found.bits +=
+      best + 2 * std::max(0.0, std::log2(static_cast<double>(number(0)) * found.time.unit_s / 3600));
+  if (real) found.time.unit_s = 1;
   fields_[column].push_back(found);
 }
 
@@ -287,7 +317,8 @@ void BinaryColumns::find_fields(double seconds) {
         if (width == 1 && big) continue;
         if (width + 4 > period) continue;
         const std::size_t before = fields_[c].size();
-        add_counter(c, width, big, seconds);
+        add_counter(c, width, big, seconds, false);
+        if (width == 8) add_counter(c, width, big, seconds, true);
         for (std::size_t k = before; k < fields_[c].size(); ++k) fields_[c][k].big_endian = big;
       }
     double same = 0;

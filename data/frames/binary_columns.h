@@ -42,27 +42,30 @@ struct FieldFound {
 
 /// Costs in bits of the columns of a stretch. A signal costs what its steps in time do - how large each is,
 /// by classes of powers of two as often as the column has them, and which of its class - and once how far it
-/// is from the signal before it in the frame: taxels side by side rest alike, and move smoothly. Read in
-/// another width, byte order or place they do neither.
+/// is from the signal before it in the frame, by classes as often as the array has them: taxels side by side
+/// rest alike, and move smoothly. Read in another width, byte order or place they do neither.
 class BinaryColumns {
  public:
   /// `seconds`: what the stretch took, 0 where it came at once.
   BinaryColumns(Bytes bytes, const Stretch& stretch, double seconds);
 
   static constexpr double kNever = std::numeric_limits<double>::infinity();
-  static constexpr std::size_t kMostSkipped = 4;
+  static constexpr std::size_t kMostSkipped = 4, kClasses = 34;  // of powers of two
 
   /// As values of one type, from every byte of the period on.
   struct Values {
     std::string type;
     bool big_endian = false;
     std::size_t width = 0;
-    std::vector<double> first = {};  ///< [period] cost of the first value of an array
-    std::vector<double> behind =
-        {};  ///< [2 period] cost of each value behind another, summed in steps of width
+    std::vector<double> alone = {};  ///< [period] cost of where a value rests, of which no other is known
+    std::vector<double> moves = {};  ///< [2 period] cost of the steps in time, summed in steps of width
     std::vector<double> still = {};  ///< [2 period] values that never move, summed likewise
-    std::vector<bool> sign = {},
-                      rests_signed = {};  ///< [period] its highest bit is set at times; at the beginning
+    /// [2 period] how far values rest from those before them, as counts of classes, summed likewise.
+    std::vector<std::array<std::uint16_t, kClasses>> apart = {};
+    /// [period] its steps take more bits than its bytes: no signal.
+    std::vector<bool> random = {};
+    std::vector<bool> high = {},
+                      highs = {};  ///< [period] its highest bit is set at times; in several numbers
     /// Cost of `count` values from byte `at`, below the period, on: and of how many of them never move.
     double bits(std::size_t at, std::size_t count) const;
   };
@@ -83,7 +86,7 @@ class BinaryColumns {
   void find_constants();
   void find_values();
   void find_fields(double seconds);
-  void add_counter(std::size_t column, std::size_t width, bool big_endian, double seconds);
+  void add_counter(std::size_t column, std::size_t width, bool big_endian, double seconds, bool real);
 
   Bytes bytes_;
   Stretch stretch_;

@@ -1,5 +1,6 @@
 // Reading and period of lines.
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <set>
@@ -283,19 +284,37 @@ std::string find_checksum(const std::vector<std::string>& lines) {
   return 5 * hex > with ? "hex" : "none";
 }
 
-void say_what_was_taken_away(const std::vector<std::string>& raw, TextGrammar& grammar) {
-  bool nul = false, mark = false, wide = false, ansi = false;
-  for (const std::string& line : raw) {
-    nul = nul || line.find('\0') != std::string::npos;
-    mark = mark || line.find("\xEF\xBB\xBF") != std::string::npos;
-    wide = wide || line.find("\xFF\xFE") != std::string::npos || line.find("\xFE\xFF") != std::string::npos;
-    ansi = ansi || line.find("\x1B[") != std::string::npos;
+/// A line, where nine in ten are hexadecimal numbers of one width without a mark, and some have letters.
+std::string bare_hexadecimal(const std::vector<std::string>& lines) {
+  std::size_t alike = 0;
+  std::string sample;
+  for (const std::string& line : lines) {
+    std::size_t width = 0, run = 0;
+    bool hex = true, letters = false;
+    for (const unsigned char c : line + " ") {
+      if (std::isxdigit(c) != 0) {
+        ++run, letters = letters || c > '9';
+      } else {
+        hex = hex && std::isalnum(c) == 0 && (run == 0 || width == 0 || run == width);
+        width = run > 0 ? run : width, run = 0;
+      }
+    }
+    hex = hex && width > 1, alike += hex;
+    if (hex && letters) sample = line;
   }
+  return 10 * alike > 9 * lines.size() ? sample : "";
+}
+
+void say_what_was_taken_away(const std::vector<std::string>& raw, TextGrammar& grammar) {
+  const auto has = [&](std::string_view mark) {
+    return std::ranges::any_of(raw, [&](const auto& line) { return line.find(mark) != std::string::npos; });
+  };
+  const bool wide = has("\xFF\xFE") || has("\xFE\xFF");
   std::vector<std::string> what;
   if (wide) what.emplace_back("UTF-16");
-  if (mark) what.emplace_back("a mark of UTF-8");
-  if (nul && !wide) what.emplace_back("NUL bytes");
-  if (ansi) what.emplace_back("ANSI sequences");
+  if (has("\xEF\xBB\xBF")) what.emplace_back("a mark of UTF-8");
+  if (!wide && has({"\0", 1})) what.emplace_back("NUL bytes");
+  if (has("\x1B[")) what.emplace_back("ANSI sequences");
   if (!what.empty()) grammar.says.push_back("taken away: " + joined(what, ", "));
 }
 
@@ -315,6 +334,12 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
   if (grammar.format.checksum != "none")
     for (std::string& line : lines)
       if (const auto sum = checksum_of(line)) line = std::string(trimmed(sum->line));
+  if (const std::string hex = bare_hexadecimal(lines); !hex.empty()) {
+    grammar.doubt =
+        "hexadecimal numbers without 0x, which no sensor's file can say, or decimal ones, as in " +
+        in_quotes(hex.substr(0, 40));
+    return grammar;
+  }
   const Commas commas = commas_of(lines);
   const char decimal = commas == Commas::points ? ',' : '.';
   // Cells where no number is lost in them, else numbers.

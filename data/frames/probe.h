@@ -65,11 +65,11 @@ std::optional<TaxelArray> assumed_array(std::size_t values, std::span<const std:
 struct BinaryReading {
   FrameFormat format;
   std::size_t values = 0, period = 0;  ///< numbers, and bytes, of a frame
-  double bits = 0, explained = 0;      ///< explained = 1 - bits / bits as sent
+  double bits = 0, sent = 0;           ///< of the description, and of all bytes as they came
   bool unit_assumed = false;           ///< of the clock; a file says nothing of the time it took
   bool unknown = false;                ///< some bytes are no value and have no meaning that is known
   bool mixed = false;                  ///< its fields have two byte orders
-  bool sign_unsure = false;            ///< signed, though no signal is below 0 at the beginning
+  bool sign_unsure = false;            ///< signed, though what is below 0 is the same number each time
   std::string text() const;
 };
 /// Readings of the bytes, the best first, no two of which give the same numbers. Header (0 to 4 bytes),
@@ -77,7 +77,7 @@ struct BinaryReading {
 /// the length of the bytes' description (binary_columns.h). `values`: how many a frame has, where that is
 /// known.
 std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::optional<std::size_t> values);
-/// The best reading, where it leads the second by 7 bits (128 to 1), and no reading
+/// The best reading, where it leads the second by 8 bits (256 to 1), and no reading
 /// takes a part of its frames for whole ones; else empty, and `says` names both.
 std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
                                                 std::optional<std::size_t> values,

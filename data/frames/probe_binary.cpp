@@ -17,41 +17,49 @@ namespace {
 constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // that are looked at: the last
 constexpr std::size_t kLongestHeader = 4, kLongestTrailer = 4, kFewRows = 8, kLongToSkip = 600,
                       kMostSummed = 150'000'000;  // some tenths of a second
-constexpr double kClearLead = 7, kMostLead = 40, kPositive = 12, kLeastExplained = 0.05;
+constexpr double kClearLead = 8, kMostLead = 40;
 constexpr double kNever = BinaryColumns::kNever;
 
-// What people take for headers costs fewer bits than other bytes, and a byte's complement behind it fewer
-// yet.
-double bits_of_header(unsigned char byte, int before) {
-  constexpr unsigned char kOften[] = {0xAA, 0x55, 0xA5, 0x5A, 0xFF, 0xFE, 0xFA, 0xC3, 0x3C, 0x7E, 0x24, 0x02,
-                                      0xEB, 0x90, 0xBB, 0xCC, 0xDD, 0xEE, 0xFD, 0xFC, 0xF0, 0x5B, 0x7B, 0x23};
-  if (before + byte == 255) return 2;
-  return std::ranges::find(kOften, byte) != std::end(kOften) ? 4 : byte == 0 ? 12 : 8;
+// A byte of a header or a trailer, beside another of it (below 0 for none): what people take for them costs
+// fewer bits than other bytes, and what goes on as its neighbour does - the complement, the next number, one
+// more letter - fewer yet.
+double bits_of_mark(unsigned char byte, int beside) {
+  constexpr unsigned char kOften[] = {0xAA, 0x55, 0xA5, 0x5A, 0xFF, 0xFE, 0xFA, 0xC3, 0x3C, 0x7E,
+                                      0x24, 0x02, 0xEB, 0x90, 0xBB, 0xCC, 0xDD, 0xEE, 0xFD, 0xFC,
+                                      0xF0, 0x5B, 0x7B, 0x23, 0x03, 0x10, 0x0A, 0x0D};
+  const auto is_letter = [](int c) {
+    return lower(static_cast<char>(c)) >= 'a' && lower(static_cast<char>(c)) <= 'z';
+  };
+  if (beside + byte == 255 || beside == byte + 1 || beside == byte - 1) return 2;
+  if (std::ranges::find(kOften, byte) != std::end(kOften)) return 4;
+  if (beside > 0 && is_letter(beside) && is_letter(byte)) return 5;
+  return byte == 0 ? 12 : 8.5;
 }
 // Of one before `behind`, below 0 for the last.
 double bits_of_trailer(unsigned char byte, int behind) {
-  if (behind + byte == 255) return 2;
   const bool ends = (byte == '\r' || byte == '\n') && (behind < 0 || behind == '\r' || behind == '\n');
-  return ends ? 1 : byte == 0 ? kNever : 10;
+  return ends ? 1 : byte == 0 ? kNever : bits_of_mark(byte, behind);
 }
 
-// People build arrays of some sides more often than of others; kNever where no array has so many values.
+// People build arrays of some sides more often than of others, and square ones most often; kNever where no
+// array has so many values.
 double bits_of_count(std::size_t count) {
   const auto weight = [](std::size_t side) {
     for (const std::size_t often : {4, 8, 16, 32, 64})
       if (side == often) return 8.0;
     for (const std::size_t at_times : {1, 2, 3, 5, 6, 10, 12, 20, 24, 48})
       if (side == at_times) return 4.0;
-    return 1.0;
+    return 28.0 / static_cast<double>(side);
   };
   double sum = 0;
   for (const auto& [channels, share] : {std::pair(1, 0.9), {3, 0.08}, {2, 0.02}}) {
     if (count % static_cast<std::size_t>(channels) != 0) continue;
     const std::size_t taxels = count / static_cast<std::size_t>(channels);
     for (std::size_t rows = 1; rows <= 64; ++rows)
-      if (taxels % rows == 0 && taxels / rows <= 64) sum += share * weight(rows) * weight(taxels / rows);
+      if (taxels % rows == 0 && taxels / rows <= 64)
+        sum += share * weight(rows) * weight(taxels / rows) * (rows * rows == taxels ? 3 : 1);
   }
-  return sum > 0 ? -std::log2(sum / 16641) : kNever;
+  return sum > 0 ? -std::log2(sum / (129 * 129)) : kNever;
 }
 
 double bits_of_type(const std::string& type) {
@@ -87,7 +95,9 @@ class Search {
           const std::size_t at = start + period_ - trailer;
           trailer_bits += columns_.constant(at) +
                           bits_of_trailer(columns_.usual(at), trailer == 1 ? -1 : columns_.usual(at + 1)) +
-                          (trailer == 1 ? 3 : 0);
+                          (trailer == 1  ? 3
+                           : trailer > 2 ? 2
+                                         : 0);
         }
         if (trailer_bits == kNever) break;
         try_headers(start, trailer, trailer_bits);
@@ -132,8 +142,8 @@ class Search {
       if (header == 1 && columns_.usual(start) == 0) break;  // nobody begins a frame by 0
       if (header > 0)
         header_bits += columns_.constant(start + header - 1) +
-                       bits_of_header(columns_.usual(start + header - 1),
-                                      header == 1 ? -1 : columns_.usual(start + header - 2));
+                       bits_of_mark(columns_.usual(start + header - 1),
+                                    header == 1 ? -1 : columns_.usual(start + header - 2));
       if (header_bits == kNever) break;
       Ends ends{header, trailer, nullptr,
                 outside_ + trailer_bits + header_bits + kLengths[header] + start_bits_[start]};
@@ -210,30 +220,32 @@ class Search {
       if (counts_[count] < 0) counts_[count] = bits_of_count(count);
       double all = ends.bits + bits + values.bits(at, count) + counts_[count] + bits_of_type(values.type);
       if (!(all < least_ + kMostLead)) continue;
-      // A signed sensor rests below 0 somewhere, or crosses it in small steps.
-      bool sign = false, rests = false;
-      for (std::size_t k = 0; k < count && !rests; ++k) {
-        const std::size_t column = (at + k * values.width) % period_;
-        sign = sign || values.sign[column], rests = values.rests_signed[column];
-      }
-      if (values.type.front() == 'i' && sign && !rests) all += kPositive;
-      least_ = std::min(least_, all);
-      const bool is_signed = values.type.front() == 'i' && (sign || rests);
-      int clock = 0;  // two readings of the time are two readings
+      bool big = values.width > 1 && values.big_endian, little = values.width > 1 && !values.big_endian;
+      std::size_t clock = 0;  // two readings of the time are two readings
       for (const Parts* parts : {&before, &behind})
-        for (const FieldFound* field : *parts)
+        for (const FieldFound* field : *parts) {
           if (field->field.is == FrameField::Is::time)
-            clock =
-                static_cast<int>(field->width) + (field->big_endian ? 16 : 0) + (parts == &behind ? 32 : 0);
+            clock = field->width + (field->big_endian ? 16 : 0) + (parts == &behind ? 32 : 0);
+          if (field->width > 1 && field->field.is != FrameField::Is::skip)
+            (field->big_endian ? big : little) = true;
+        }
+      if (big && little) all += kClearLead;  // hardly anybody mixes byte orders
+      least_ = std::min(least_, all);
+      // Random numbers are no signal. Below 0 there is more than a mark that stands for an error.
+      bool random = false, is_signed = false, sure = false;
+      for (std::size_t k = 0; k < count; ++k) {
+        const std::size_t column = (at + k * values.width) % period_;
+        random = random || values.random[column], is_signed = is_signed || values.high[column];
+        sure = sure || (values.high[column] && values.highs[column]);
+      }
+      is_signed = is_signed && values.type.front() == 'i';
       const auto key = std::tuple(at, count, values.width, values.width > 1 && values.big_endian,
-                                  (values.type.front() == 'f' ? 2
-                                   : is_signed                ? 1
-                                                              : 0) +
-                                      4 * clock);
+                                  (values.type.front() == 'f' ? 2 : std::size_t{is_signed}) + 4 * clock);
       const auto known = best_.find(key);
       if (known != best_.end() && known->second.bits <= all) continue;
-      best_[key] = reading(start, values, count, ends, before, behind, all);
-      best_[key].sign_unsure = values.type.front() == 'i' && sign && !rests;
+      BinaryReading& found = best_[key] = reading(start, values, count, ends, before, behind, all);
+      found.mixed = big && little, found.sign_unsure = is_signed && !sure;
+      found.unknown = found.unknown || random;
     }
   }
 
@@ -251,10 +263,7 @@ class Search {
       if (field.field.is == FrameField::Is::time) {
         f.time = field.time, r.unit_assumed = !field.sure;
         if (values.width == 1) f.big_endian = field.big_endian;
-        r.mixed = r.mixed || field.big_endian != f.big_endian;
       }
-      if (field.field.is == FrameField::Is::counter && field.width > 1)
-        r.mixed = r.mixed || (field.big_endian != f.big_endian && values.width > 1);
       r.unknown = r.unknown || field.field.is == FrameField::Is::skip;
     };
     for (const FieldFound* field : before) add(*field);
@@ -279,7 +288,7 @@ class Search {
   std::optional<std::size_t> wanted_;
   double outside_ = 0, least_ = kNever;
   std::map<std::pair<std::size_t, std::size_t>, Checksum> checksums_;
-  std::map<std::tuple<std::size_t, std::size_t, std::size_t, bool, int>, BinaryReading> best_;
+  std::map<std::tuple<std::size_t, std::size_t, std::size_t, bool, std::size_t>, BinaryReading> best_;
 };
 
 // What came after a pause begins a frame: cost of where the pauses ended, for each byte of the period.
@@ -304,8 +313,13 @@ std::vector<double> bits_of_starts(std::span<const Heard> heard, std::size_t fir
   }
   const double least = std::ranges::min(bits);
   for (double& b : bits) b = std::min(b - least, kMost);
-  if (first_byte == 0 && stretch.begin == 0)
-    for (std::size_t c = 1; c < period; ++c) bits[c] += 2;
+  // Every second time the bytes begin with a frame, and end with one.
+  const double by_chance = std::log2(static_cast<double>(period) + 1);
+  const std::size_t end = bytes - first_byte - stretch.begin;
+  for (std::size_t c = 0; c < period; ++c) {
+    if (first_byte + stretch.begin == 0 && c > 0) bits[c] += by_chance;
+    if (end < (stretch.rows + 1) * period && (end - c) % period != 0) bits[c] += by_chance;
+  }
   return bits;
 }
 
@@ -332,7 +346,7 @@ std::string BinaryReading::text() const {
   if (f.type.back() != '8') text += f.big_endian ? " big-endian" : " little-endian";
   if (f.checksum != "none") text += ", checksum " + f.checksum;
   if (!f.trailer.empty()) text += ", trailer " + hex(f.trailer);
-  return text + " (explains " + supertac::format(100 * explained, 0) + " % of the bytes)";
+  return text + " (explains " + supertac::format(100 * (1 - bits / sent), 0) + " % of the bytes)";
 }
 
 std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::optional<std::size_t> values) {
@@ -349,7 +363,7 @@ std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::op
     const BinaryColumns columns(bytes, stretch, seconds < kAtOnceS ? 0 : seconds * share);
     Search(bytes, columns, bits_of_starts(heard, first, stretch, seconds, all.size()), values).run(found);
   }
-  for (BinaryReading& r : found) r.explained = 1 - r.bits / (8.0 * static_cast<double>(bytes.size()));
+  for (BinaryReading& r : found) r.sent = 8.0 * static_cast<double>(bytes.size());
   std::ranges::sort(found, {}, &BinaryReading::bits);
   return found;
 }
@@ -358,7 +372,7 @@ std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
                                                 std::optional<std::size_t> values,
                                                 std::vector<std::string>& says) {
   const std::vector<BinaryReading> found = binary_readings(heard, values);
-  if (found.empty() || found[0].explained < kLeastExplained) {
+  if (found.empty() || found[0].bits > found[0].sent - kMostLead) {
     says.push_back(
         "binary without a period: a wrong baud rate, a checksum or type that is not known, or no sensor");
     return std::nullopt;

@@ -18,9 +18,8 @@ namespace {
 
 constexpr double kClock = 0.25;  // how far the host's clock and the sensor's may differ in a probe
 constexpr std::size_t kMostRestarts = 2, kStepsOfRestart = 20;  // noise falls far more often
-constexpr double kRestarted = 0.3;      // of the time at least a clock runs that starts anew meanwhile
-constexpr std::size_t kFewLines = 3;    // of which nothing can be said
-constexpr std::size_t kManyLines = 30;  // a signal does not rise from each of them to the next
+constexpr double kRestarted = 0.3;    // of the time at least a clock runs that starts anew meanwhile
+constexpr std::size_t kFewLines = 3;  // of which nothing can be said
 
 struct Lines {
   std::vector<std::string> text;  // clean

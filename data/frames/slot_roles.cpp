@@ -70,6 +70,15 @@ double steady_step(const std::vector<double>& v) {
   return 0;
 }
 
+/// Whether whole numbers from 0 or 1 on run through the same again and again, as noise does not.
+bool cycles(const std::vector<double>& v) {
+  if (v.size() < kFew || !whole(v) || constant(v)) return false;
+  if (const double low = std::ranges::min(v); low != 0 && low != 1) return false;
+  for (std::size_t period = 2; 3 * period <= v.size(); ++period)
+    if (std::equal(v.begin() + static_cast<std::ptrdiff_t>(period), v.end(), v.begin())) return true;
+  return false;
+}
+
 /// The unit in which so many frames take `seconds`, to a quarter; 0: in none.
 double unit_live(double step, std::size_t frames, double seconds) {
   for (const double unit : {1.0, 1e-3, 1e-6, 1e-9}) {
@@ -172,6 +181,10 @@ SlotRole role_of(TextGrammar& g, std::size_t c, double seconds, bool clock) {
   if (constant(v))
     return {SlotRole::constant,
             std::isnan(v[0]) ? "says " + in_quotes(g.sample[c]) + " only" : "is always " + format(v[0])};
+  if (cycles(v))
+    g.doubt = "slot " + std::to_string(c) +
+              " runs through the same numbers again and again: a row or column that its line belongs to, or "
+              "a signal";
   if (!finite || v.size() < kFew || !std::ranges::is_sorted(v))
     return {SlotRole::signal, "changes from frame to frame"};
   g.doubt = "slot " + std::to_string(c) +
@@ -289,6 +302,9 @@ std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
     roles.push_back(role_of(g, c, seconds, clock));
     clock = clock || (roles[c].kind == SlotRole::clock && roles[c].unit_s > 0);
   }
+  if (const auto clocks = std::ranges::count(roles, SlotRole::clock, &SlotRole::kind); clocks > 2)
+    g.doubt =
+        std::to_string(clocks) + " slots rise steadily: clocks, or signals that drift; listen for longer";
   label_rows(g, roles);
   if (candidates(roles).empty()) return roles;
   compare_names(g, roles);

@@ -231,6 +231,7 @@ std::vector<TextSlot> slots_of(std::string_view line, char separator, char decim
     const std::size_t text = lists(line[begin]) ? begin + 1 : begin;
     slot.text = line.substr(text, i - text), slot.before = line.substr(behind, text - behind);
     slots.push_back(slot);
+    while (i < line.size() && letter(line[i])) ++i;  // its unit
     behind = i;
   }
   return slots;

@@ -34,7 +34,8 @@ inline int mutations(int quick) {
 /// One frame of so many values, in the order of the frame.
 inline std::string sent_frame(const Sensor& sensor, std::span<const double> values, double time_s) {
   const FrameFormat& f = sensor.frame;
-  const double stamp = f.time ? std::round(time_s / f.time->unit_s) : 0;
+  const double exact = f.time ? time_s / f.time->unit_s : 0,
+               stamp = f.time && f.time->type == "f64" ? exact : std::round(exact);
   std::string bytes;
   if (f.kind == FrameKind::text) {
     std::size_t next = 0;

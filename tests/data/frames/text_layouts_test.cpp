@@ -200,6 +200,52 @@ Layout second_layout_of(std::uint64_t seed) {
   return layout;
 }
 
+/// Firmware's habits: glued units, a line for each taxel with its row and column, hexadecimal without 0x, a
+/// baseline that drifts beside the signals.
+Layout third_layout_of(std::uint64_t seed) {
+  Draws draw(seed + 1000);
+  constexpr std::pair<std::size_t, std::size_t> kArrays[] = {{4, 4}, {3, 3}, {2, 6}};
+  const auto [rows, columns] = kArrays[draw.below(std::size(kArrays))];
+  const std::size_t cells = rows * columns, form = seed % 4;
+  const std::string between = draw.often(0.5) ? "\t" : " ", unit = draw.often(0.5) ? "g" : "mV";
+  const bool stamped = draw.often(0.5);
+  Layout layout;
+  layout.values = form == 3 ? 2 * cells : cells, layout.clock = form == 0 && stamped;
+  constexpr const char* kForms[] = {"units", "row,column,value", "hexadecimal", "drift"};
+  layout.what = "third family, seed " + std::to_string(seed) + ", " + kForms[form];
+  std::vector<double> rest;
+  for (std::size_t k = 0; k < cells; ++k)
+    rest.push_back(form == 2 ? 0x16 + draw.below(3) : 20 + draw.below(9));
+  for (int n = 0; n < 240; ++n) {
+    const double t = 1 + 0.02 * n;
+    std::vector<double> now;
+    std::string text;
+    for (std::size_t k = 0; k < cells; ++k) {
+      const bool pressed = n / 30 % 2 == 1 && k == static_cast<std::size_t>(n / 60) % cells;
+      now.push_back(std::round(10 * (rest[k] + (pressed ? 9 : 0) + draw.normal())) / 10);
+      if (form > 0) now[k] = std::round(now[k]);
+      const int whole = static_cast<int>(now[k]);
+      constexpr char kHex[] = "0123456789ABCDEF";
+      if (form == 1)
+        text += std::to_string(k / columns) + "," + std::to_string(k % columns) + "," +
+                std::to_string(whole) + "\r\n";
+      else if (form == 2)
+        text += std::string(k > 0 ? " " : "") + kHex[whole >> 4 & 15] + kHex[whole & 15];
+      else
+        text += (k > 0 ? between : "") + (form == 0 ? format(now[k], 1) + unit : std::to_string(whole));
+    }
+    if (form == 0 && stamped) text = clock_of_day(84000.5 + 0.02 * n) + " -> " + text;
+    if (form == 3) {
+      text = "now: " + text + "\r\nbase: ";
+      for (std::size_t k = 0; k < cells; ++k)
+        now.push_back(rest[k] + n / 40), text += format(now.back(), 0) + (k + 1 < cells ? between : "");
+    }
+    layout.sent.push_back(now), layout.time_s.push_back(t);
+    layout.heard.push_back({t, form == 1 ? text : text + "\r\n"});
+  }
+  return layout;
+}
+
 /// Right: all frames that were sent but two, as they were sent and with their times where the lines say them;
 /// none besides. A frame with "nan" has the others' mean there.
 bool reads(const Layout& layout, const Sensor& draft) {
@@ -252,6 +298,8 @@ void expect_right_or_refused(Layout (*layout_of_seed)(std::uint64_t), int count,
 }
 
 TEST(TextLayouts, AreDraftedRightOrRefused) { expect_right_or_refused(layout_of, 80, 0.85); }
+// Of the third only those with units can be right.
+TEST(TextLayouts, HabitsOfFirmwareAreNeverWrong) { expect_right_or_refused(third_layout_of, 40, 0.25); }
 TEST(TextLayouts, OfObjectsAndSeveralArraysToo) { expect_right_or_refused(second_layout_of, 40, 0.85); }
 
 }  // namespace
