@@ -1,6 +1,5 @@
 // Reading and period of lines.
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <set>
@@ -282,27 +281,6 @@ std::string find_checksum(const std::vector<std::string>& lines) {
   for (const auto& [kind, count] : fits)
     if (10 * count > 8 * with) return kind;
   return 5 * hex > with ? "hex" : "none";
-}
-
-/// A line, where nine in ten are hexadecimal numbers of one width without a mark, and some have letters.
-std::string bare_hexadecimal(const std::vector<std::string>& lines) {
-  std::size_t alike = 0;
-  std::string sample;
-  for (const std::string& line : lines) {
-    std::size_t width = 0, run = 0;
-    bool hex = true, letters = false;
-    for (const unsigned char c : line + " ") {
-      if (std::isxdigit(c) != 0) {
-        ++run, letters = letters || c > '9';
-      } else {
-        hex = hex && std::isalnum(c) == 0 && (run == 0 || width == 0 || run == width);
-        width = run > 0 ? run : width, run = 0;
-      }
-    }
-    hex = hex && width > 1, alike += hex;
-    if (hex && letters) sample = line;
-  }
-  return 10 * alike > 9 * lines.size() ? sample : "";
 }
 
 void say_what_was_taken_away(const std::vector<std::string>& raw, TextGrammar& grammar) {

@@ -327,15 +327,7 @@ std::vector<double> bits_of_starts(std::span<const Heard> heard, std::size_t fir
 
 std::string BinaryReading::text() const {
   const FrameFormat& f = format;
-  const auto hex = [](const std::string& bytes) {
-    std::string digits;
-    for (const char c : bytes) {
-      const auto byte = static_cast<unsigned char>(c);
-      digits += "0123456789ABCDEF"[byte >> 4], digits += "0123456789ABCDEF"[byte & 15];
-    }
-    return digits;
-  };
-  std::string text = f.header.empty() ? "no header" : "header " + hex(f.header);
+  std::string text = f.header.empty() ? "no header" : "header " + hex_of_bytes(f.header);
   for (const FrameField& field : f.fields) {
     if (field.is == FrameField::Is::counter) text += ", a counter " + field.type;
     if (field.is == FrameField::Is::skip)
@@ -345,7 +337,7 @@ std::string BinaryReading::text() const {
   text += ", " + std::to_string(values) + " values " + f.type;
   if (f.type.back() != '8') text += f.big_endian ? " big-endian" : " little-endian";
   if (f.checksum != "none") text += ", checksum " + f.checksum;
-  if (!f.trailer.empty()) text += ", trailer " + hex(f.trailer);
+  if (!f.trailer.empty()) text += ", trailer " + hex_of_bytes(f.trailer);
   return text + " (explains " + supertac::format(100 * (1 - bits / sent), 0) + " % of the bytes)";
 }
 

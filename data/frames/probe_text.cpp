@@ -54,14 +54,13 @@ bool from_printer(std::string_view line) {
 // From each value to the next.
 struct Steps {
   double went = 0, longest = 0;  // upwards
-  std::size_t fell = 0, rose = 0, by_one = 0;
+  std::size_t fell = 0, rose = 0;
 };
 Steps steps_of(std::span<const double> values) {
   Steps steps;
   for (std::size_t i = 1; i < values.size(); ++i) {
     const double step = values[i] - values[i - 1];
     if (step < 0) ++steps.fell;
-    if (step == 1) ++steps.by_one;
     if (step > 0) ++steps.rose, steps.went += step, steps.longest = std::max(steps.longest, step);
   }
   return steps;
@@ -83,15 +82,8 @@ std::string places(const std::vector<int>& slots) {
 // Every slot's role is said; time and skip are written from them.
 std::optional<FoundFormat> found_by_roles(TextGrammar& grammar, double seconds,
                                           std::vector<std::string>& says) {
-  constexpr std::pair<SlotRole::Kind, const char*> kNames[] = {
-      {SlotRole::signal, "signal"},
-      {SlotRole::clock, "clock"},
-      {SlotRole::counter, "counter"},
-      {SlotRole::checksum, "checksum"},
-      {SlotRole::constant, "signal that never changes"},
-      {SlotRole::label, "label"},
-      {SlotRole::words, "words"},
-      {SlotRole::other, "no taxel"}};
+  constexpr const char* kNames[] = {"signal", "clock", "counter", "checksum", "signal that never changes",
+                                    "label",  "words", "no taxel"};  // by SlotRole::Kind
   const std::vector<SlotRole> roles = roles_of(grammar, seconds);
   FoundFormat found{.format = grammar.format, .array = {}, .remark = {}};
   std::vector<std::pair<std::string, std::vector<int>>> said;
@@ -105,8 +97,7 @@ std::optional<FoundFormat> found_by_roles(TextGrammar& grammar, double seconds,
       found.format.skip.push_back(column);
     else if (++values; std::ranges::all_of(grammar.columns[c], [](double v) { return std::isnan(v); }))
       found.dead.push_back(static_cast<int>(values) - 1);
-    const auto* name = std::ranges::find(kNames, role.kind, [](const auto& n) { return n.first; });
-    const std::string what = std::string(name->second) + ": " + role.why;
+    const std::string what = std::string(kNames[role.kind]) + ": " + role.why;
     const auto known = std::ranges::find(said, what, [](const auto& s) { return s.first; });
     (known == said.end() ? said.emplace_back(what, std::vector<int>{}) : *known).second.push_back(column);
   }
@@ -257,7 +248,7 @@ std::optional<double> unit_of_clock(std::span<const double> stamps, double secon
   if (stamps.size() < kFewLines) return std::nullopt;
   // A clock may start anew while one listens, and stands still meanwhile; of what waited before one listened,
   // some may come first. Stamps of a clock that is coarser than the frames are the same for several.
-  const auto [went, longest, fell, rose, by_one] = steps_of(stamps);
+  const auto [went, longest, fell, rose] = steps_of(stamps);
   if (fell > std::min(kMostRestarts, stamps.size() / kStepsOfRestart) || 2 * rose < stamps.size() - 1)
     return std::nullopt;
   if (seconds < kAtOnceS) {  // a file says nothing of the time it took: a clock of milliseconds, or a counter

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -265,6 +266,26 @@ std::optional<TextChecksum> checksum_of(std::string_view line) {
 
 unsigned TextChecksum::computed(const std::string& kind) const {
   return checksum_of(kind, std::as_bytes(std::span(line.substr(line.starts_with('$') ? 1 : 0))));
+}
+
+std::string bare_hexadecimal(const std::vector<std::string>& lines) {
+  std::size_t alike = 0;
+  std::string sample;
+  for (const std::string& line : lines) {
+    std::size_t width = 0, run = 0;
+    bool hex = true, letters = false;
+    for (const unsigned char c : line + " ") {
+      if (std::isxdigit(c) != 0) {
+        ++run, letters = letters || c > '9';
+      } else {
+        hex = hex && std::isalnum(c) == 0 && (run == 0 || width == 0 || run == width);
+        width = run > 0 ? run : width, run = 0;
+      }
+    }
+    hex = hex && width > 1, alike += hex;
+    if (hex && letters) sample = line;
+  }
+  return 10 * alike > 9 * lines.size() ? sample : "";
 }
 
 TextFrames::Result TextFrames::push(std::string_view raw) {

@@ -41,6 +41,10 @@ struct TextChecksum {
 };
 std::optional<TextChecksum> checksum_of(std::string_view line);
 
+/// A line, where nine in ten are hexadecimal numbers of one width without a mark, and some have letters.
+/// Empty else.
+std::string bare_hexadecimal(const std::vector<std::string>& lines);
+
 /// Frames of one or several lines, line by line.
 class TextFrames {
  public:

@@ -130,4 +130,7 @@ nlohmann::ordered_json json_of(const Pitch& pitch);
 Pitch pitch_of(JsonObject& keys, std::optional<Pitch> fallback = {});
 SignalScale scale_of(JsonObject keys);
 
+/// A frame's header or trailer as a file states it: two hexadecimal digits for each byte.
+std::string hex_of_bytes(const std::string& bytes);
+
 }  // namespace supertac

@@ -58,16 +58,6 @@ std::string bytes_of_hex(JsonObject& keys, const char* name) {
   return bytes;
 }
 
-std::string hex_of_bytes(const std::string& bytes) {
-  constexpr char kDigits[] = "0123456789ABCDEF";
-  std::string hex;
-  for (const char c : bytes) {
-    const auto byte = static_cast<unsigned char>(c);
-    hex += kDigits[byte >> 4], hex += kDigits[byte & 15];
-  }
-  return hex;
-}
-
 FrameTime time_of(const Json& json, FrameKind kind, const std::string& where) {
   JsonObject keys(json, where, "frame.time.");
   FrameTime time;
@@ -243,6 +233,16 @@ Json json_of(const FrameFormat& f) {
 }
 
 }  // namespace
+
+std::string hex_of_bytes(const std::string& bytes) {
+  constexpr char kDigits[] = "0123456789ABCDEF";
+  std::string hex;
+  for (const char c : bytes) {
+    const auto byte = static_cast<unsigned char>(c);
+    hex += kDigits[byte >> 4], hex += kDigits[byte & 15];
+  }
+  return hex;
+}
 
 Json json_of(const SignalScale& scale) {
   return {{"unit", scale.unit},
