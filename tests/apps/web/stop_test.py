@@ -60,6 +60,12 @@ class Sleeper:
             dead.set()
 
 
+def real_time():
+    """For what stands for a board and a printer, which wait for no processor of this machine."""
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(5))
+
+
 class PrinterTap:
     """Between program and printer: when the stop and the lift behind it went through, and when the planner had the lift."""
 
@@ -77,6 +83,7 @@ class PrinterTap:
             threading.Thread(target=self.pump, args=(a, b), daemon=True).start()
 
     def pump(self, a, b):
+        real_time()
         with contextlib.suppress(OSError):
             while data := os.read(a, 4096):
                 now = time.monotonic()
@@ -112,7 +119,7 @@ def one_stop(binaries, folder, browsers, number, dice):
         home = folder / str(number)
         home.mkdir()
         rig = [binaries / "supertac-rig", "--plate", "6_Ridges", "--board-link", home / "board", "--printer-link", home / "inner"]
-        rig = subprocess.Popen(rig, stdout=subprocess.PIPE, text=True)
+        rig = subprocess.Popen(rig, stdout=subprocess.PIPE, text=True, preexec_fn=real_time)
         stack.callback(rig.wait)
         stack.callback(rig.terminate)
         assert rig.stdout.readline() == "ready\n"
