@@ -28,7 +28,9 @@ WindowSet load_windows(const Arguments& a, const ModelFile& file) {
       a.given("plates") ? a.list("plates") : comma_list(value_or(file.metadata, "plates"));
   add_model_parents(a.list("model"));
   add_parent("recordings", hash_of_recordings(a.text("data"), plates));
-  return WindowSet::load(a.text("data"), plates, file.windows(),
+  WindowSettings settings = file.windows();
+  if (a.given("contact")) settings.contact_level = static_cast<float>(a.number("contact", 0, 1));
+  return WindowSet::load(a.text("data"), plates, settings,
                          progress_of(a, "reading " + a.text("data"), "recordings"));
 }
 
@@ -140,7 +142,8 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
   for (const std::string& line : scores.trust.lines()) a.print(line);
   for (const std::string& line : scores.map.lines()) a.print(line);
   if (const auto level = windows.contact_level()) {
-    a.print("contact: a pixel of the measured truth above " + format(*level, 3) + ", from its noise at rest");
+    a.print("contact: a pixel of the measured truth above " + format(*level, 3) +
+            (a.given("contact") ? "" : ", from its noise at rest"));
     result["contact_level"] = *level;
   }
   result["latency"] = latencies;
@@ -174,6 +177,10 @@ void declare(Arguments& a) {
   a.option("seed", "N", "of the split (default: the model's own)");
   a.option("limit", "N", "score at most N windows, evenly spread; 0 = all", "0");
   a.option("precision", "NAME", "fp32, or int8: the pictures of a microcontroller, slower", "fp32");
+  a.option("contact", "VALUE",
+           "of a measured truth: where a pixel shows more, from 0 to 1, something is in contact (default: "
+           "from its noise "
+           "at rest)");
   a.option("batch", "N", "windows that are drawn at once; their pictures do not depend on it", "64");
   a.decides_nothing();
   a.option("outputs", "FILE",

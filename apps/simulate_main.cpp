@@ -57,8 +57,6 @@ std::vector<Job> plan_passes(const Arguments& arguments, const std::vector<Plate
   const auto speeds = arguments.numbers("speeds", 0.5, rig::kFastestMmS);
   const int trials = static_cast<int>(arguments.integer("trials", 1, 1000));
   const int passes = static_cast<int>(arguments.integer("passes", 1, rig::kPasses));
-  const double from = arguments.number("from", 0, Plate::kLengthMm - 1),
-               to = arguments.number("to", 1, Plate::kLengthMm);
   for (const Plate& plate : plates) {
     for (const double speed : speeds) {
       for (int trial = 1; trial <= trials; ++trial) {
@@ -68,8 +66,7 @@ std::vector<Job> plan_passes(const Arguments& arguments, const std::vector<Plate
           named.trial = trial;
           named.pass = pass;
           named.speed_mm_s = speed;
-          const PassSettings settings{
-              .trial = trial, .pass = pass, .speed_mm_s = speed, .from_mm = from, .to_mm = to};
+          const PassSettings settings{.trial = trial, .pass = pass, .speed_mm_s = speed};
           jobs.push_back({[&plate, settings, &simulator, seed] {
                             return simulate_pass(plate, settings, simulator, seed);
                           },
@@ -83,7 +80,7 @@ std::vector<Job> plan_passes(const Arguments& arguments, const std::vector<Plate
 
 std::vector<Job> plan_presses(const Arguments& arguments, const Sensor& sensor, OutputFolder& folder) {
   constexpr int kPressesOfARecording = 125;
-  for (const char* other : {"plates", "speeds", "trials", "passes", "from", "to", "without"})
+  for (const char* other : {"plates", "speeds", "trials", "passes", "without"})
     if (arguments.given(other))
       throw UsageError(std::string("--presses: nothing slides over a plate; leave --") + other + " out");
   const int scale = std::stoi(arguments.choice("scale", {"2", "4", "8", "16"}));
@@ -146,9 +143,6 @@ void declare(Arguments& arguments) {
       .option("speeds", "MM_PER_S,...", "sliding speeds in mm/s", "5,10")
       .option("trials", "N", "trials of every plate and speed", "2")
       .option("passes", "N", "passes of every trial, 5 mm apart in x (at most 8)", "8")
-      .option("from", "MM", "where the finger's centre begins to slide; T samples before a window are needed",
-              "0")
-      .option("to", "MM", "where the slide ends", format(Plate::kLengthMm))
       .option("sensor", "FILE",
               "a sensor's file, or rig: its array, rate, unit, polarity and range instead of the rig's",
               "rig")

@@ -322,7 +322,7 @@ Zone WindowSet::zone(std::size_t i) const {
 
 std::optional<float> WindowSet::contact_level() const {
   if (contact_levels_.empty()) return std::nullopt;
-  return median(std::vector(contact_levels_));
+  return settings_.contact_level ? settings_.contact_level : median(std::vector(contact_levels_));
 }
 
 std::optional<double> WindowSet::filter_s() const {

@@ -26,6 +26,7 @@ struct WindowSettings {
   std::optional<TaxelArray> array = {};  ///< that every recording must have; nothing: that of the first
   std::optional<SignalScale> signal_scale = {};  ///< likewise, its unit and polarity
   std::optional<Body> body = {};                 ///< of what is simulated beside them: that of the first
+  std::optional<float> contact_level = {};       ///< of measured truths; nothing: as contact_level() finds it
   int stride = 1;                                ///< every stride-th frame of a pass ends a window
   double max_gap_s = 0.05;                       ///< longer silence in a recording is a gap no window crosses
 };
