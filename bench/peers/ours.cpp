@@ -1,13 +1,13 @@
 // The side of bench/peers/compare.py that runs our code: one order a line on stdin, one answer a line on
 // stdout.
 //
-//   peers_ours MODEL WINDOWS        WINDOWS: safetensors with `windows` [N,T,16]
-//   pictures FILE          infers all windows, writes `pictures` [N,S,S]             -> done
-//   cost                   -> multiply-adds of inference, of training, per window
-//   infer BATCH SECONDS    -> median processor time, median wall time of a call (s), median FMA peak
-//   (GFLOP/s) train THREADS SECONDS [BATCH]  the same for a training step of 64 windows, or so many
-//   each COUNT FILE        the wall time of so many pictures one by one, `seconds` [COUNT]  -> page faults on
-//   the way spin COUNT FILE        the same for additions that take about as long and need no memory
+//   peers_ours MODEL WINDOWS          WINDOWS: safetensors with `windows` [N,T,16]
+//   pictures FILE                     infers all windows, writes `pictures` [N,S,S]    -> done
+//   cost                              -> multiply-adds of inference, of training, per window
+//   infer BATCH SECONDS               -> medians: processor and wall time of a call (s), FMA peak (GFLOP/s)
+//   train THREADS SECONDS [BATCH]     the same for a training step of 64 windows, or so many
+//   each COUNT FILE                   wall times of pictures one by one, `seconds` [COUNT]  -> page faults
+//   spin COUNT FILE                   the same for additions that take as long and need no memory
 #include <immintrin.h>
 #include <omp.h>
 #include <sys/resource.h>
