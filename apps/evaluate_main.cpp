@@ -189,7 +189,7 @@ void declare(Arguments& a) {
   a.option(
        "map", "FILE",
        "write the surfaces that were felt, of each plate and trial: .png; .safetensors, with those of each "
-       "pass beside them; or of one plate and trial .stl (docs/map.md)")
+       "pass beside them; .csv, their elements; or of one plate and trial .stl (docs/map.md)")
       .writes();
   a.option(
       "elements", "KIND",

@@ -81,10 +81,9 @@ void declare(Arguments& a) {
               "PlotJuggler and "
               "ros2 bag open")
       .writes()
-      .option(
-          "map", "FILE",
-          "keep the surface that was felt, as far as the finger's places are known: .png, .safetensors or "
-          ".stl (docs/map.md)")
+      .option("map", "FILE",
+              "keep the surface that was felt, as far as the finger's places are known: .png, .safetensors, "
+              ".csv (its elements) or .stl (docs/map.md)")
       .writes()
       .option(
           "elements", "KIND",

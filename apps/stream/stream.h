@@ -32,17 +32,17 @@ struct StreamSettings {
   std::string plate = "unknown";        ///< of the recording: a plate's name or an STL file
   OutputPath map = "";                  ///< file of the surface that was felt; empty: none
   std::optional<Plate> elements = {};   ///< the kind that the map's elements are drawn as, where it is known
-  bool view = false;                    ///< draw on the terminal
+  bool view = false;                    ///< show the figures on the terminal
   std::optional<WebAddress> web = {};   ///< serve the live page
   std::string badge = {}, source = {};  ///< for the page: what is streamed
   std::vector<std::string> found = {};  ///< for the page: what a probe of the source found, a line each
   std::map<std::string, std::string> metadata = {};  ///< of files with pictures
 };
 
-/// From a source's frames to pictures, on the terminal, on a page and in a file; counts what was lost and how
-/// long a picture took. Without a model the array's own signals are what is shown and kept. A picture of a
-/// live source that would be older than 20 ms is not made: where the machine is too slow, or was busy, the
-/// newest count.
+/// From a source's frames to pictures, on a page and in files, and figures on the terminal; counts what was
+/// lost and how long a picture took. Without a model the array's own signals are what is shown and kept. A
+/// picture of a live source that would be older than 20 ms is not made: where the machine is too slow, or was
+/// busy, the newest count.
 class Stream {
  public:
   /// `models`, of which there may be none, and `source` must outlive this. Throws as PictureMaker,

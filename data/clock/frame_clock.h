@@ -10,25 +10,24 @@
 // date.
 //
 // The assumptions:
-//   - The period is within `tolerance` of the stated one and steady to 2e-4 over a recording. Where reads are
-//   so
-//     late that single losses do not show, either the stated period is right or fewer than a tenth of the
-//     frames are lost.
-//   - One read in ten is later than J, one in a hundred later than 2 J, and so on. What this lets happen once
-//   in
-//     1e13 times does not happen, so that of n reads, J apart, one at least is late by no more than 13 J / n.
-//     J is measured on single reads and, as reads may be late together, on the earliest of each 16.
-//   - A read takes all that has come: a frame was made after the read in front of it, but for a time that is
-//     extrapolated to 1e-13 in the same way. This does not hold behind a loss, where a second buffer may
-//     stand.
-//   - How long the frames of a first read of several have waited is not known: their intervals have no begin.
+//   - The period is within `tolerance` of the stated one and steady to 2e-4 over a recording. Where reads
+//     are so late that single losses do not show, either the stated period is right or fewer than a tenth
+//     of the frames are lost.
+//   - One read in ten is later than J, one in a hundred later than 2 J, and so on: that n reads, J apart,
+//     are all later than x has the chance 10^(-n x / J). What has a chance below 1e-13 does not happen, so
+//     one of them is late by no more than 13 J / n. J is measured on single reads and, as reads may be late
+//     together, on the earliest of each 16.
+//   - A read takes all that has come. So a frame was made after the read in front of its own, but for
+//     Lateness::waited_s, which is extrapolated to 1e-13 in the same way. Behind a loss this does not hold:
+//     a buffer of the adapter or the host may have been full, and another may stand behind it.
+//   - How long frames had waited that came together in the first read is not known: their intervals have
+//     no beginning.
 //   - Of two stamps next to each other one is right. Three that go on from one another, but not from those
-//   before,
-//     show that the device has started anew.
+//     before, show that the device has started anew.
 //
 // The promise: every frame was made within its interval, up to one offset, the smallest delay of the stream.
-// No frame that arrived is counted as lost, but by FrameClock as long as all that come are late. A simulator
-// of boards, cables and hosts tests it (tests/data/clock).
+// No frame that arrived is counted as lost, except that FrameClock, which knows no later ones, may count
+// some while all that come are late. A simulator of boards, cables and hosts tests it (tests/data/clock).
 #pragma once
 
 #include <algorithm>
@@ -43,7 +42,7 @@
 
 namespace supertac {
 
-/// Of the rig's board, whose crystal is known, within 0.5 %; of others a stated rate is a word.
+/// The tolerance is 0.5 % for the rig's board, whose crystal is known; the stated rate of others is a hint.
 ClockSettings clock_settings(const Sensor& sensor, bool stored = false);
 
 /// A frame as it came.
@@ -109,10 +108,10 @@ struct FrameTimeline {
   std::vector<FrameDate> dates;
   double period_s = rig::kFramePeriodS;    ///< what the dates use
   double measured_s = rig::kFramePeriodS;  ///< what the frames say
-  bool plausible = true;  ///< measured_s is within the tolerance; else period_s is the stated
+  bool plausible = true;  ///< measured_s is within the tolerance; else period_s is the stated one
   std::uint64_t missing = 0, resets = 0;
 };
-/// Dates are of the port's clock; of what is stored, of the device's.
+/// Dates are of the port's clock; of frames read from a file (`stored`), of the device's.
 FrameTimeline timeline_of(const ClockSettings& settings, std::span<const FrameArrival> arrivals);
 
 }  // namespace supertac

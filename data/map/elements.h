@@ -33,8 +33,8 @@ std::vector<std::pair<const char*, double>> numbers_of(const Element& element);
 std::vector<Element> elements(const NamedMap& map);
 inline constexpr float kLowest = 0.2F;
 
-/// The median distance of an element from its nearest neighbour (mm), of lines across the line; NaN below
-/// two.
+/// The median distance of an element from its nearest neighbour (mm), measured across them where they are
+/// lines; NaN below two.
 double pitch_mm(const std::vector<Element>& elements);
 
 /// Like: 6 elements, 5.99 mm apart
@@ -49,12 +49,12 @@ Plate kind_of_elements(const std::string& name);
 /// on every plate, and go on beyond what was felt.
 Plate plate_of(const std::vector<Element>& found, const Plate& kind);
 
-/// Draws the map anew: what was felt becomes plate_of(elements(map), kind), and an error how far that moves
-/// when all places move by as much as they may be off, in the worst of the four directions.
+/// Draws the map anew: what was felt becomes plate_of(elements(map), kind), and the error of a cell
+/// the largest change there over the four moves of all places by (+-x_off_mm, +-y_off_mm).
 void draw_as(NamedMap& map, const Plate& kind);
 
 /// How the elements of a map stand beside those of its truth, taken in the same way: a true one is found when
-/// one that no other has taken lies within kFoundMm, of lines across the line; what is left over is false.
+/// one that no other has taken lies within kFoundMm, measured across lines; what is left over is false.
 struct ElementScores {
   static constexpr double kFoundMm = 1;
   std::size_t existing = 0, found = 0, invented = 0;

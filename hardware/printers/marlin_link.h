@@ -23,7 +23,7 @@ namespace supertac {
 struct MarlinCapabilities {
   std::string firmware;           ///< the text of FIRMWARE_NAME, empty when not told
   bool emergency_parser = false;  ///< M112, M410 act ahead of the queue
-  bool klipper = false;           ///< no line is ever asked for again, no M410, no M114 R
+  bool klipper = false;           ///< never asks for a line again, has no M410 and no M114 R
   bool quick_stop() const { return !klipper; }
 };
 
@@ -58,14 +58,15 @@ class MarlinLink {
   Answer command(std::string_view code, double deadline_s = 0);
 
   /// Sends `code` (M410, M112, M108) without number, ahead of everything: only the emergency parser sees it
-  /// in time.
+  /// in time; without one it waits its turn.
   void emergency(std::string_view code);
 
   /// From now on a pause ends no wait: it is answered by M108, and the wait goes on.
   void answer_pauses() { answers_pauses_ = true; }
 
   /// M410, after a command that an exception interrupted. The next command may be sent at once: it waits in
-  /// the firmware for the end of the stop, and takes neither of the two oks before its own.
+  /// the firmware for the end of the stop, and takes neither the ok of the interrupted one nor M410's
+  /// for its own.
   void stop();
 
   /// After a command that an exception interrupted: reads until it has been acknowledged, `seconds` at most.
@@ -123,7 +124,7 @@ class MarlinLink {
   std::string complaint_;                // what was said since an ok; the cause of a halt stands before it
   std::deque<std::string> kept_;         // lines number_ - kept_.size() + 1 ... number_
   std::int64_t number_ = 0;              // of the newest line
-  std::size_t heard_ = 0, numbers_ = 0;  // lines until it answered; of these, such as a sensor sends
+  std::size_t heard_ = 0, numbers_ = 0;  // lines until it answered; those like a sensor's
   double give_up_s_ = std::numeric_limits<double>::infinity();
   bool connected_ = false;
   bool halted_ = false;
