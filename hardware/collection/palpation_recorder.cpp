@@ -70,16 +70,16 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
   Printer printer(captured, settings.bed.limits);
   printer.link().set_watch([&] { check_stop(settings, journal); });
   printer.link().give_up_at(captured.now() + longest_run_s(settings));
-  printer.connect();
   try {
+    printer.connect();
     settings.home ? printer.home() : printer.confirm_origin(settings.bed.origin);
+    auto port = std::make_unique<CapturedPort>(std::move(board_port), journal, Stream::board);
+    SensorReader board({.port = std::move(port)}, settings.sensor, settings.reader);
+    return record(board, printer, settings, journal);
   } catch (...) {
     printer.put_back();
     throw;
   }
-  auto port = std::make_unique<CapturedPort>(std::move(board_port), journal, Stream::board);
-  SensorReader board({.port = std::move(port)}, settings.sensor, settings.reader);
-  return record(board, printer, settings, journal);
 }
 
 }  // namespace

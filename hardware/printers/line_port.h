@@ -24,7 +24,7 @@ class LinePort {
   /// The same of what has been received already.
   bool take(std::string& line);
   /// What has come of a line whose break has not.
-  void forget() { input_.clear(); }
+  void forget() { input_.erase(input_.find_last_of("\r\n") + 1); }
 
   double arrival_s() const { return arrival_s_; }   ///< of the last byte received
   std::size_t bytes() const { return bytes_; }      ///< received so far

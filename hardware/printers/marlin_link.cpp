@@ -109,7 +109,7 @@ void MarlinLink::count_copy(Exchange& exchange, const std::string& why) {
   exchange.answer.repeated = true;
   exchange.fault = exchange.asked = false;
   ++counters_.repeats;
-  lines_.forget();  // half an answer, such as an ok whose line break was lost
+  forget();
 }
 
 void MarlinLink::repeat(Exchange& exchange, const std::string& why) {
@@ -265,13 +265,26 @@ void MarlinLink::settle() {
   double quiet_until = lines_.port().now() + kQuiet;
   while (lines_.arrival_s() < limit && read_line(std::min(quiet_until, limit), line)) {
     const Reply reply = parse_reply(line);
-    if (reply.kind == ReplyKind::start || reply.kind == ReplyKind::fatal) check_alarm(reply);
+    heed(reply);
     // Reports come for ever; what is waited for is the end of answers.
     const bool report = reply.kind == ReplyKind::position || reply.kind == ReplyKind::temperature;
     if (!report) quiet_until = lines_.arrival_s() + kQuiet;
   }
-  lines_.forget();
+  forget();
   owed_ = 0;
+}
+
+// Answers, and half an answer such as an ok whose line break was lost; not what is said unasked.
+void MarlinLink::forget() {
+  std::string line;
+  while (lines_.take(line)) heed(parse_reply(line));
+  lines_.forget();
+}
+
+void MarlinLink::heed(const Reply& reply) {
+  for (const ReplyKind alarm :
+       {ReplyKind::start, ReplyKind::fatal, ReplyKind::paused, ReplyKind::interrupted})
+    if (reply.kind == alarm) check_alarm(reply);
 }
 
 void MarlinLink::check_alarm(const Reply& reply) {

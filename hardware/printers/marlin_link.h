@@ -79,7 +79,8 @@ class MarlinLink {
   /// Throws PrinterReset, PrinterHalted when one of the replies says so.
   void idle(double seconds);
 
-  /// Reads replies until for 0.05 s none came but automatic reports (at most 2 s).
+  /// Reads replies until for 0.05 s none came but automatic reports (at most 2 s). Throws PrinterReset,
+  /// PrinterHalted, PrinterPaused when one of them says so.
   void settle();
 
   /// Called at least every 0.02 s while waiting for the firmware; what it throws ends the wait.
@@ -114,6 +115,8 @@ class MarlinLink {
   void on_unknown_command(Exchange& exchange, const Reply& reply);
   void on_last_line(Exchange& exchange, std::int64_t last);
   void finish(const Exchange& exchange);
+  void forget();
+  void heed(const Reply& reply);
   void check_alarm(const Reply& reply);
   /// As LinePort::read(), and gives up when it is time to.
   bool read_line(double until, std::string& line);

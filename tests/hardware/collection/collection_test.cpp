@@ -65,6 +65,20 @@ TEST(Collection, NothingMovesBeforeTheBoardIsHeard) {
   EXPECT_EQ(bench.folder.entries(), 0U) << "a journal of nothing was left behind";
 }
 
+TEST(Collection, WhatWasSetIsPutBackWhereverTheRunEnds) {
+  for (const bool stopped : {false, true}) {
+    CollectionBench bench(running_rig({.left_over = {.speed_percent = 150}}));
+    if (!stopped) bench.rig.unplug_board();
+    // While the board is waited for: the state is set, and nothing has moved.
+    bench.settings.stop = [&] {
+      return stopped && bench.rig.world().printer().left_over().speed_percent == 100;
+    };
+    EXPECT_ANY_THROW(bench.record());
+    EXPECT_EQ(bench.rig.world().printer().left_over().speed_percent, 150);
+    EXPECT_TRUE(moves_of(bench.rig.world().printer()).empty());
+  }
+}
+
 TEST(Collection, ABoardThatGoesAwayInContactEndsWithTheFingerUp) {
   CollectionBench bench(running_rig());
   bench.settings.bed.plan.passes = 2;

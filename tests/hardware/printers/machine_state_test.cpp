@@ -156,6 +156,20 @@ TEST(MachineState, WhatTheDisplaySaysEndsTheRunFingerUp) {
     EXPECT_LT(run.bench.rig.now() - run.planted_s, 4) << said;
     EXPECT_LT(run.bench.head().y, 122);
   }
+  // In the same read as the complaint of a damaged line, and as the answer to it that was sent again.
+  using Changes = std::vector<Tampering::Change>;
+  const Tampering::Change cancelled = {"ok\n", "ok\n//action:cancel\n"};
+  for (const Changes& changes : {Changes{cancelled}, Changes{{"Resend", "Resend"}, cancelled}}) {
+    Interrupted run({}, [&changes](PrinterBench& bench) {
+      bench.port.to_printer = {{"M0114", "M0115"}};
+      bench.port.from_printer = changes;
+    });
+    EXPECT_EQ(run.bench.port.to_printer.size(), 0U);
+    EXPECT_EQ(run.bench.port.from_printer.size(), 0U);
+    EXPECT_EQ(run.outcome.finger, PalpationOutcome::Finger::lifted) << run.outcome.note;
+    EXPECT_ERROR(std::rethrow_exception(run.outcome.error), PrinterPaused, "action:");
+    EXPECT_LT(run.bench.head().y, 122);
+  }
   Interrupted other({}, [](PrinterBench& b) { b.firmware().inject("//action:notification Printing\n"); });
   EXPECT_TRUE(other.outcome.complete);
 }
