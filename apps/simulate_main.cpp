@@ -115,7 +115,7 @@ std::size_t simulate(const std::vector<Job>& jobs, const Sensor& sensor, FeltTax
       restate(recording, sensor.scale);
       const std::size_t signals = recording.array.signals();
       for (std::size_t f = 0; sensor.array == recording.array && f < recording.frames(); ++f)
-        sensor.fill_silent(std::span(recording.volts).subspan(f * signals, signals));
+        sensor.fill_silent(std::span(recording.signals).subspan(f * signals, signals));
       write_recording(jobs[i].path, recording);
 #pragma omp critical
       {

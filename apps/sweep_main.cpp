@@ -224,8 +224,8 @@ Json row_of(const Recipe& recipe, const TrainingRun& training, const ZoneMetrics
   SuperTacSettings s = recipe.model;
   set_array(s, training.task().windows->array());
   const Tensor window = Tensor::full(model.input_shape(1), real(0.5));
-  const Prepared prepared(model);
-  const Latency latency = measure_latency([&] { prepared.estimate(window); });
+  const CompiledModel compiled(model);
+  const Latency latency = measure_latency([&] { compiled.estimate(window); });
   Json row = {{"model", model_name_of(recipe)}, {"preset", s.preset}};
   for (const Axis& axis : kAxes) row[axis.name] = s.*axis.setting;
   row["seed"] = recipe.seed;
@@ -263,7 +263,7 @@ Json measure(const Arguments& a, const Recipe& recipe, const std::string& label)
                        {.out = out, .force = true, .resume = fs::exists(state) ? state : "", .label = label});
   if (!training.train()) throw Interrupted();
   const ZoneMetrics scores =
-      score(Ensemble({Prepared(training.trainer().model())}), *windows, to_score, interrupted);
+      score(Ensemble({CompiledModel(training.trainer().model())}), *windows, to_score, interrupted);
   stop_if_interrupted();
   const Json row = row_of(recipe, training, scores);
   fs::remove(state);  // nothing is left to resume

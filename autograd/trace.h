@@ -1,5 +1,5 @@
-// Trace: records which ops ran, with which inputs and settings. Prepared networks are built from it
-// (models/inference/prepared/prepared.h), opened training steps list it
+// Trace: records which ops ran, with which inputs and settings. CompiledModel networks are built from it
+// (models/inference/compiled/compiled_model.h), opened training steps list it
 // (models/training/audit/opened_step.h).
 #pragma once
 

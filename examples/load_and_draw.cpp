@@ -35,7 +35,7 @@ Tensor window_at(const ModelFile& file, const Recording& recording, double secon
                                      static_cast<double>(recording.frames() - 1)});
   for (std::size_t i = 0; i < recording.frames() && recording.time_s[i] <= seconds; ++i)
     live.push(recording.time_s[i],
-              std::span(recording.volts).subspan(i * recording.array.signals(), recording.array.signals()));
+              std::span(recording.signals).subspan(i * recording.array.signals(), recording.array.signals()));
   Tensor window(Shape{1, settings.timesteps, settings.signals()});
   if (!live.window(window.values()))
     throw std::runtime_error("too few frames before " + std::to_string(seconds) + " s: a picture needs " +

@@ -19,7 +19,7 @@
 #include "io/numbers/numbers.h"
 #include "library/guard.h"
 #include "models/files/model_file.h"
-#include "models/inference/prepared/prepared.h"
+#include "models/inference/compiled/compiled_model.h"
 #include "models/training/train.h"
 
 using namespace supertac;
@@ -27,7 +27,7 @@ using c::expect, c::expect_within, c::guarded;
 
 struct supertac_model {
   ModelFile file;
-  Prepared prepared;
+  CompiledModel compiled;
 };
 
 struct supertac_pairs {
@@ -62,7 +62,7 @@ thread_local bool alone = false;
 supertac_model* opened(ModelFile file, int precision) {
   expect(precision == SUPERTAC_FP32 || precision == SUPERTAC_INT8,
          "precision: expected SUPERTAC_FP32 or SUPERTAC_INT8");
-  Prepared ready = prepared(file, precision == SUPERTAC_INT8 ? Precision::int8 : Precision::fp32);
+  CompiledModel ready = compiled(file, precision == SUPERTAC_INT8 ? Precision::int8 : Precision::fp32);
   return new supertac_model{std::move(file), std::move(ready)};
 }
 
@@ -78,7 +78,7 @@ void scale(const ModelFile& file, std::span<float> windows) {
 }
 
 void draw(const supertac_model& model, const Tensor& inputs, float* pictures, float* predicted_errors) {
-  const Estimate drawn = model.prepared.estimate(inputs);
+  const Estimate drawn = model.compiled.estimate(inputs);
   expect(predicted_errors == nullptr || drawn.predicted_error.size() > 0, "the model predicts no error");
   std::copy_n(drawn.picture.data(), drawn.picture.size(), pictures);
   if (predicted_errors != nullptr)
@@ -143,8 +143,8 @@ int supertac_describe(const supertac_model* model, supertac_description* descrip
                                     .pitch_mm = {input.pitch_mm.x, input.pitch_mm.y},
                                     .pixel_mm = {pixel.x, pixel.y},
                                     .filter_s = input.filter_s.value_or(-1),
-                                    .rest = input.scaling.rest_volts,
-                                    .span = input.scaling.span_volts};
+                                    .rest = input.scaling.rest,
+                                    .span = input.scaling.span};
     std::memcpy(description, &full, full.size);
     return 0;
   });

@@ -8,7 +8,7 @@
 #include "autograd/kernels/fast/isa/isa.h"
 #include "data/recordings/simulator.h"
 #include "io/numbers/sha256.h"
-#include "models/inference/prepared/prepared.h"
+#include "models/inference/compiled/compiled_model.h"
 #include "models/training/trainer.h"
 
 namespace supertac {
@@ -34,7 +34,7 @@ void add(Sha256& sum, std::span<const T> values) {
 Bits bits_here() {
   const Recording pass = simulate_pass(Plate::named("ridges6"), {.from_mm = 20, .to_mm = 45});
   Sha256 recording;
-  add(recording, std::span(pass.volts));
+  add(recording, std::span(pass.signals));
   add(recording, std::span(pass.time_s));
   WindowSet windows(
       {.timesteps = 32, .scale = 4, .rate_hz = 100, .scaling = {.per_window = true}, .stride = 4});
@@ -58,11 +58,11 @@ Bits bits_here() {
   for (std::size_t i = 0; i < kPictures; ++i)
     windows.window(i * (windows.size() - 1) / (kPictures - 1), inputs.values().subspan(i * size, size));
   Sha256 pictures, bytes;
-  const Estimate drawn = Prepared(trainer.model()).estimate(inputs);
+  const Estimate drawn = CompiledModel(trainer.model()).estimate(inputs);
   add(pictures, std::as_const(drawn.picture).values());
   ActivationRanges ranges;
   ranges.add(trainer.model(), inputs);
-  const Estimate coarse = Prepared(trainer.model(), ranges).estimate(inputs);
+  const Estimate coarse = CompiledModel(trainer.model(), ranges).estimate(inputs);
   add(bytes, std::as_const(coarse.picture).values());
   return {short_hash(recording), short_hash(training), short_hash(pictures), short_hash(bytes)};
 }

@@ -25,15 +25,15 @@ Recording heard(const Recording& recording, double at, double max_gap_s) {
   Recording part;
   part.array = recording.array;
   for (std::size_t i = 0; i < recording.frames() && recording.time_s[i] <= at; ++i) {
-    const auto volts = std::span(recording.volts).subspan(i * signals, signals);
+    const auto volts = std::span(recording.signals).subspan(i * signals, signals);
     if (!std::all_of(volts.begin(), volts.end(), [](float v) { return std::isfinite(v); })) continue;
     if (!part.time_s.empty() && recording.time_s[i] - part.time_s.back() > max_gap_s) {
       part.time_s.clear();
-      part.volts.clear();
+      part.signals.clear();
       part.position_mm.clear();
     }
     part.time_s.push_back(recording.time_s[i]);
-    part.volts.insert(part.volts.end(), volts.begin(), volts.end());
+    part.signals.insert(part.signals.end(), volts.begin(), volts.end());
     if (recording.position_mm.empty()) continue;
     part.position_mm.insert(part.position_mm.end(),
                             {recording.position_mm[2 * i], recording.position_mm[2 * i + 1]});
@@ -143,26 +143,23 @@ int check_picture(const Arguments& a) {
   const std::uint64_t n = input.frames.frames(), s = input.frames.array.signals();
   const auto t = static_cast<std::uint64_t>(w.timesteps);
   std::vector<Array> arrays{array("time_s", {n}, std::span<const double>(input.frames.time_s)),
-                            array("volts", {n, s}, std::span<const float>(input.frames.volts)),
+                            array("volts", {n, s}, std::span<const float>(input.frames.signals)),
                             array("scaled", {t, s}, input.scaled), array("input", input.window)};
   const Json steps = trace(*file.model, input.window, arrays);
   // As programs draw it: the same numbers up to rounding, or in whole numbers.
   std::size_t count = 0;
   const Precision precision = precision_of(a.choice("precision", {"fp32", "int8"}));
   const Estimate drawn =
-      prepared(file, precision).watched(input.window, [&](const std::string& step, const Tensor& map) {
+      compiled(file, precision).watched(input.window, [&](const std::string& step, const Tensor& map) {
         arrays.push_back(array("drawn." + std::to_string(1000 + count++).substr(1) + "." + step, map));
       });
   arrays.push_back(array("picture", drawn.picture));
   if (drawn.predicted_error.defined()) arrays.push_back(array("predicted_error", drawn.predicted_error));
   std::vector<TensorToWrite> tensors;
   for (const Array& x : arrays) tensors.push_back({x.name, x.dtype, x.shape, x.bytes});
-  const Json signal = {{"rate_hz", w.rate_hz},
-                       {"rest_volts", w.scaling.rest_volts},
-                       {"span_volts", w.scaling.span_volts},
-                       {"levelled", w.scaling.per_window},
-                       {"least_gain", kLeastGain},
-                       {"rest_removed", kRestRemoved}};
+  const Json signal = {{"rate_hz", w.rate_hz},         {"rest_volts", w.scaling.rest},
+                       {"span_volts", w.scaling.span}, {"levelled", w.scaling.per_window},
+                       {"least_gain", kLeastGain},     {"rest_removed", kRestRemoved}};
   write_safetensors(a.output("out"),
                     {{"kind", "explanation"}, {"steps", steps.dump()}, {"signal", signal.dump()}}, tensors);
   const double end = w.timesteps == 1 ? input.frames.time_s.back()

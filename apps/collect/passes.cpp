@@ -54,7 +54,7 @@ Recording recording_of(const CollectedPass& pass, const Collection& collection, 
   recording.signal_scale = collection.sensor.scale;
   recording.body = collection.sensor.body;
   recording.time_s = pass.time_s;
-  recording.volts = pass.volts;
+  recording.signals = pass.signals;
   for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
     recording.position_mm.push_back(static_cast<float>(pass.position[3 * i] - plate.x));
     recording.position_mm.push_back(static_cast<float>(pass.position[3 * i + 1] - plate.y));

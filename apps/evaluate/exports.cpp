@@ -22,7 +22,7 @@ Picture figure(const std::vector<ShownWindow>& shown, std::span<const std::uint3
   const TaxelArray array = windows.array();
   const StripLayout layout{array.rows, array.columns, windows.settings().scale, side};
   std::vector<Strip> strips;
-  for (const ShownWindow& w : shown) strips.push_back({w.felt, w.drawn, w.truth, w.half_widths});
+  for (const ShownWindow& w : shown) strips.push_back({w.input, w.drawn, w.truth, w.half_widths});
   const Picture inside = down ? strip_picture(strips, layout) : film_picture(strips, layout);
   const int parts = shown.empty() || shown.front().half_widths.empty() ? 3 : 4,
             count = static_cast<int>(strips.size());

@@ -233,7 +233,7 @@ std::string EvaluationPage::shown(const std::string& title, const std::string& n
       cards += "<span><img alt=\"" + std::string(what) + ", " + escaped(name) + "\" src=\"" +
                png_of(values, rows, columns) + "\">" + what + "</span>";
     };
-    add("felt", p.felt, array.rows, array.columns);
+    add("felt", p.input, array.rows, array.columns);
     add("drawn", p.drawn, grid.height, grid.width);
     add("true", p.truth, grid.height, grid.width);
     add("difference", difference, grid.height, grid.width);
@@ -253,7 +253,7 @@ std::string EvaluationPage::films(std::span<const std::uint32_t> frames,
       passes.push_back({{"name", name_of(window)}, {"frames", nlohmann::json::array()}});
     }
     const ShownWindow& p = pictures.at(window);
-    std::vector<float> all = p.felt;
+    std::vector<float> all = p.input;
     all.insert(all.end(), p.drawn.begin(), p.drawn.end());
     all.insert(all.end(), p.truth.begin(), p.truth.end());
     passes.back()["frames"].push_back(

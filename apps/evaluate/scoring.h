@@ -41,8 +41,8 @@ struct Drawn {
 
 /// A window as it is shown to people.
 struct ShownWindow {
-  std::vector<float> felt, drawn, truth;  ///< the last frame's taxels, and pictures
-  std::vector<float> half_widths;         ///< of the pixels' 90 % intervals; empty where the network has none
+  std::vector<float> input, drawn, truth;  ///< the last frame's taxels, and pictures
+  std::vector<float> half_widths;  ///< of the pixels' 90 % intervals; empty where the network has none
 };
 
 /// The windows `chosen`, drawn once more.

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/stream/seen.h"
+#include "apps/stream/live_frame.h"
 #include "data/map/surface_map.h"
 
 namespace supertac {
@@ -19,7 +19,7 @@ struct ChangedSignal {
 struct LiveState {
   TaxelArray array;
   int scale = 4;             ///< of the picture
-  std::uint64_t number = 0;  ///< of the picture, as Seen
+  std::uint64_t number = 0;  ///< of the picture, as LiveFrame
   double time_s = 0;
   std::vector<float> taxels;  ///< [rows][columns] in [0,1], as RawArray; empty before the first
   double top = 0;             ///< what 1 is, in the sensor's unit from rest
@@ -27,7 +27,7 @@ struct LiveState {
   std::optional<ChangedSignal> most_changed;
   bool draws = true;               ///< there is a model
   std::vector<float> picture;      ///< [rows * scale][columns * scale]; empty before the first
-  std::vector<float> half_widths;  ///< the same, as Seen
+  std::vector<float> half_widths;  ///< the same, as LiveFrame
   std::optional<double> distance;
   bool unlike_training = false;  ///< the signals are not such as the model has learnt from
   std::string texture;           ///< that the picture shows, by a classifier; empty: none, or no texture

@@ -27,7 +27,7 @@ PictureLog::PictureLog(OutputPath output, const PictureFormat& format)
     : output_(std::move(output)), format_(format) {
   refuse_existing(output_.path, !output_.when_taken);
   times_ = open_spool();
-  volts_ = open_spool();
+  signals_ = open_spool();
   if (format.image.pixels() > 0) pictures_ = open_spool();
   if (format.half_widths) half_widths_ = open_spool();
   if (format.distance) distances_ = open_spool();
@@ -57,9 +57,9 @@ void PictureLog::append(const Spool& spool, std::span<const std::byte> bytes) {
 }
 
 // A file is as large as the temporary ones, which go only when it is complete.
-void PictureLog::check_room(const Seen& next) {
+void PictureLog::check_room(const LiveFrame& next) {
   const std::uint64_t row =
-      64 + sizeof(float) * (next.volts.size() + next.picture.size() + next.half_widths.size());
+      64 + sizeof(float) * (next.signals.size() + next.picture.size() + next.half_widths.size());
   if (bytes_ + row < checked_bytes_ + kCheckBytes) return;
   checked_bytes_ = bytes_ + row;
   std::error_code error;
@@ -69,11 +69,11 @@ void PictureLog::check_room(const Seen& next) {
                                     " frames until here are kept; make room, or choose another folder");
 }
 
-void PictureLog::add(const Seen& seen) {
+void PictureLog::add(const LiveFrame& seen) {
   check_room(seen);
   if (count_ == 0) began_s_ = seen.wall_s - seen.time_s, first_s_ = seen.time_s;
   append(times_, std::as_bytes(std::span(&seen.time_s, 1)));
-  append(volts_, std::as_bytes(seen.volts));
+  append(signals_, std::as_bytes(seen.signals));
   if (pictures_) append(pictures_, std::as_bytes(seen.picture));
   if (half_widths_) append(half_widths_, std::as_bytes(seen.half_widths));
   const auto distance = static_cast<float>(seen.distance.value_or(0));
@@ -126,7 +126,7 @@ void PictureLog::write(std::map<std::string, std::string> metadata) {
     const std::uint64_t kept = count_ - left_out_, row = format_.signals * sizeof(float);
     if (left_out_ > 0) metadata["left_out_frames"] = std::to_string(left_out_);
     if (times.empty()) metadata["doubt"] = "too short to know the board's clock: dated as the frames came";
-    const auto rows = [&](const ByteSink& sink) { read_rows(volts_, row, sink); };
+    const auto rows = [&](const ByteSink& sink) { read_rows(signals_, row, sink); };
     if (!times.empty())
       return write_safetensors(output_, metadata,
                                {{"time_s", "F64", {kept}, std::as_bytes(std::span(times)), {}},
@@ -137,8 +137,9 @@ void PictureLog::write(std::map<std::string, std::string> metadata) {
   };
   const auto height = static_cast<std::uint64_t>(format_.image.height),
              width = static_cast<std::uint64_t>(format_.image.width);
-  std::vector<TensorToWrite> tensors = {{"time_s", "F64", {count_}, {}, from(times_)},
-                                        {format_.tensor, "F32", {count_, format_.signals}, {}, from(volts_)}};
+  std::vector<TensorToWrite> tensors = {
+      {"time_s", "F64", {count_}, {}, from(times_)},
+      {format_.tensor, "F32", {count_, format_.signals}, {}, from(signals_)}};
   if (pictures_) tensors.push_back({"pictures", "F32", {count_, height, width}, {}, from(pictures_)});
   if (half_widths_)
     tensors.push_back({"half_widths", "F32", {count_, height, width}, {}, from(half_widths_)});

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/stream/seen.h"
+#include "apps/stream/live_frame.h"
 #include "io/files/safetensors.h"
 
 namespace supertac {
@@ -29,7 +29,7 @@ class PictureLog {
   PictureLog(const PictureLog&) = delete;
   PictureLog& operator=(const PictureLog&) = delete;
   /// Throws FileError; where there is room for no more than writing what it has, write() still can.
-  void add(const Seen& seen);
+  void add(const LiveFrame& seen);
   /// Writes the file, atomically. Throws FileError, again when add() has.
   void write(std::map<std::string, std::string> metadata);
   /// Frames that write() left out.
@@ -46,7 +46,7 @@ class PictureLog {
 
   Spool open_spool();
   void append(const Spool& spool, std::span<const std::byte> bytes);
-  void check_room(const Seen& next);
+  void check_room(const LiveFrame& next);
   void read_back(const Spool& spool, const ByteSink& sink);
   std::vector<double> dated_times();
   void read_rows(const Spool& spool, std::size_t row_bytes, const ByteSink& sink);
@@ -56,12 +56,12 @@ class PictureLog {
   PictureFormat format_;
   std::uint64_t count_ = 0, left_out_ = 0;
   std::uint64_t bytes_ = 0, checked_bytes_ = 0;  // in the temporary files
-  double began_s_ = NAN;                         // Seen::wall_s of Seen::time_s 0
-  double first_s_ = 0;                           // Seen::time_s of the first
+  double began_s_ = NAN;                         // LiveFrame::wall_s of LiveFrame::time_s 0
+  double first_s_ = 0;                           // LiveFrame::time_s of the first
   std::vector<FrameArrival> arrivals_;           // of a recording of a board
   std::vector<bool> kept_;                       // of its frames
   std::string problem_;                          // of a write that failed: what was kept is not whole
-  Spool times_, volts_, pictures_, half_widths_, distances_;
+  Spool times_, signals_, pictures_, half_widths_, distances_;
 };
 
 }  // namespace supertac

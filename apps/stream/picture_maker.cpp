@@ -55,22 +55,22 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
 // A running mean of some kRestS; the first frame begins it.
 void PictureMaker::push(const SensorFrame& frame) {
   const double share = std::min(1.0, period_s_ / kRestS);
-  resting_.resize(frame.volts.size()), move_.resize(frame.volts.size());
-  const bool first = volts_.empty();
-  volts_.assign(frame.volts.begin(), frame.volts.end());
+  resting_.resize(frame.signals.size()), move_.resize(frame.signals.size());
+  const bool first = signals_.empty();
+  signals_.assign(frame.signals.begin(), frame.signals.end());
   if (const SignalScale& own = model_.input.signal_scale; source_scale_ != own)
-    for (float& value : volts_) value = static_cast<float>(source_scale_.in(own, double{value}));
+    for (float& value : signals_) value = static_cast<float>(source_scale_.in(own, double{value}));
   for (std::size_t s = 0; s < resting_.size(); ++s)
-    if (std::isfinite(volts_[s]))
-      resting_[s] += (first ? 1 : share) * (static_cast<double>(volts_[s]) - resting_[s]);
-  for (std::size_t s = 0; s < volts_.size(); ++s) volts_[s] += move_[s];
-  window_.push(frame.time_s, volts_);
+    if (std::isfinite(signals_[s]))
+      resting_[s] += (first ? 1 : share) * (static_cast<double>(signals_[s]) - resting_[s]);
+  for (std::size_t s = 0; s < signals_.size(); ++s) signals_[s] += move_[s];
+  window_.push(frame.time_s, signals_);
 }
 
 void PictureMaker::rezero() {
   const Scaling& scaling = model_.input.scaling;
   // A rig at rest lies a little below what its scaling calls 0.
-  const double rest = scaling.rest_volts == Scaling{}.rest_volts ? rig::kRestVolts : scaling.rest_volts;
+  const double rest = scaling.rest == Scaling{}.rest ? rig::kRestVolts : scaling.rest;
   for (std::size_t s = 0; s < resting_.size(); ++s) move_[s] = static_cast<float>(rest - resting_[s]);
 }
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "apps/stream/seen.h"
+#include "apps/stream/live_frame.h"
 #include "apps/stream/sensor_source.h"
 #include "data/windows/live_window.h"
 #include "models/files/model_file.h"
@@ -42,7 +42,7 @@ class PictureMaker {
   /// it rests where it rested in training, from the next frame on.
   void rezero();
   /// The newest frame as the model takes it: moved by rezero().
-  std::span<const float> volts() const { return volts_; }
+  std::span<const float> signals() const { return signals_; }
 
   PictureFormat format() const;
   ImageGrid image() const { return model_.windows().array->picture(model_.windows().scale); }
@@ -63,8 +63,8 @@ class PictureMaker {
   std::vector<float> half_widths_;
   std::optional<double> distance_;
   static constexpr double kRestS = 0.2;
-  std::vector<float> volts_, move_;  // of the newest frame; what rezero() adds
-  std::vector<double> resting_;      // mean of the last frames as they come
+  std::vector<float> signals_, move_;  // of the newest frame; what rezero() adds
+  std::vector<double> resting_;        // mean of the last frames as they come
 };
 
 }  // namespace supertac

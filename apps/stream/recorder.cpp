@@ -77,7 +77,7 @@ void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name, const
   status_.said = said + (why.empty() || said != recorded ? "" : "; " + why);
 }
 
-void Recorder::add(const Seen& seen) {
+void Recorder::add(const LiveFrame& seen) {
   const std::lock_guard lock(log_mutex_);
   if (!log_) return;
   if (begin_s_ < 0) begin_s_ = seen.time_s;

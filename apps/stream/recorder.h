@@ -31,7 +31,7 @@ class Recorder {
   std::string finish();
   /// Of the stream's thread: nothing unless it is recording. When the disk is full a recording ends and is
   /// written.
-  void add(const Seen& seen);
+  void add(const LiveFrame& seen);
 
   struct Status {
     std::string recording;           ///< name of the file under way; empty: none

@@ -51,7 +51,7 @@ class PortSource : public SensorSource {
     if (!frame) return std::nullopt;
     frame_ = std::move(*frame);
     SensorFrame out{.time_s = frame_.date.time_s,
-                    .volts = frame_.signals,
+                    .signals = frame_.signals,
                     // On the port's clock; what is not live arrives as it is taken.
                     .arrived_s = live() ? frame_.arrival.time_s / speedup_ : monotonic_seconds()};
     if (by_arrival_) out.arrival = frame_.arrival;
@@ -85,7 +85,7 @@ class RecordingSource : public SensorSource {
     if (ended()) return std::nullopt;
     const std::size_t i = at_++, signals = array().signals();
     SensorFrame frame{.time_s = recording_.time_s[i],
-                      .volts = std::span(recording_.volts).subspan(i * signals, signals),
+                      .signals = std::span(recording_.signals).subspan(i * signals, signals),
                       .arrived_s = monotonic_seconds(),
                       .wall_s = recording_.began_s() + recording_.time_s[i]};
     if (!recording_.position_mm.empty())

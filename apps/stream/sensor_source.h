@@ -17,9 +17,9 @@
 namespace supertac {
 
 struct SensorFrame {
-  double time_s = 0;             ///< of the sensor, from any zero
-  std::span<const float> volts;  ///< in the unit of signal_scale(); valid until the next call
-  double arrived_s = 0;          ///< on this computer's clock (monotonic_seconds)
+  double time_s = 0;               ///< of the sensor, from any zero
+  std::span<const float> signals;  ///< in the unit of signal_scale(); valid until the next call
+  double arrived_s = 0;            ///< on this computer's clock (monotonic_seconds)
   double wall_s = NAN;           ///< of what is not live: when it arrived (s since 1970), where that is known
   float x_mm = NAN, y_mm = NAN;  ///< of the finger's centre on the plate, where known
   float lift_mm = 0;             ///< how far it is above its slide

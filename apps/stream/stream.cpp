@@ -236,7 +236,7 @@ bool Stream::take(SensorFrame frame) {
   ++frames_;
   last_s_ = frame.time_s;
   const bool rezero = web_ && web_->take_rezero();
-  raw_.push(frame.volts);
+  raw_.push(frame.signals);
   if (rezero) raw_.rezero();
   if (rezero && maker_) maker_->rezero();
   if (record_ || recorder_ || !maker_) keep_raw(frame);
@@ -255,9 +255,9 @@ bool Stream::take(SensorFrame frame) {
 
 // A frame with a signal that is no number has no place in a recording.
 void Stream::keep_raw(const SensorFrame& frame) {
-  if (!std::ranges::all_of(frame.volts, [](float v) { return std::isfinite(v); })) return;
-  Seen seen;
-  seen.number = frames_ - 1, seen.time_s = frame.time_s - first_s_, seen.volts = frame.volts;
+  if (!std::ranges::all_of(frame.signals, [](float v) { return std::isfinite(v); })) return;
+  LiveFrame seen;
+  seen.number = frames_ - 1, seen.time_s = frame.time_s - first_s_, seen.signals = frame.signals;
   seen.wall_s = frame.wall_s;
   seen.arrival = frame.arrival;
   if (record_) record_->add(seen);
@@ -269,22 +269,22 @@ void Stream::keep_raw(const SensorFrame& frame) {
   state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
 }
 
-void Stream::output(const Seen& seen) {
+void Stream::output(const LiveFrame& seen) {
   if (log_) log_->add(seen);
-  if (mcap_) mcap_->add(seen.time_s, seen.wall_s, seen.volts, seen.picture, seen.half_widths);
+  if (mcap_) mcap_->add(seen.time_s, seen.wall_s, seen.signals, seen.picture, seen.half_widths);
   if (!pipe_) return;
-  const FrameLoad load = load_of(seen.volts, source_.array().channels, source_.signal_scale());
+  const FrameLoad load = load_of(seen.signals, source_.array().channels, source_.signal_scale());
   pipe_->send(picture_line(seen, load, state_.unlike_training, about_lines_));
 }
 
 void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
-  const Seen seen{.number = pictures() - 1,
-                  .time_s = frame.time_s - first_s_,
-                  .wall_s = frame.wall_s,
-                  .volts = maker_->volts(),
-                  .picture = picture,
-                  .half_widths = maker_->half_widths(),
-                  .distance = maker_->distance()};
+  const LiveFrame seen{.number = pictures() - 1,
+                       .time_s = frame.time_s - first_s_,
+                       .wall_s = frame.wall_s,
+                       .signals = maker_->signals(),
+                       .picture = picture,
+                       .half_widths = maker_->half_widths(),
+                       .distance = maker_->distance()};
   state_.unlike_training = maker_->unlike_training();
   output(seen);
   state_.number = seen.number, state_.time_s = seen.time_s;

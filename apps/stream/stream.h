@@ -75,7 +75,7 @@ class Stream {
   double keep_pace(double time_s) const;
   void keep(const SensorFrame& frame, std::span<const float> picture);
   void keep_raw(const SensorFrame& frame);
-  void output(const Seen& seen);
+  void output(const LiveFrame& seen);
   void write_map() const;
   NamedMap named_map() const;
   void complete();

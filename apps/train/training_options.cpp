@@ -111,7 +111,7 @@ static std::optional<Scaling> stated_range(const Arguments& a) {
         "--range expects REST,SPAN with a SPAN that is not 0 (below 0 where pressing raises the signals), "
         "found " +
         text);
-  return Scaling{.rest_volts = *rest, .span_volts = *span};
+  return Scaling{.rest = *rest, .span = *span};
 }
 
 Recipe recipe_of(const Arguments& a, Recipe r) {

@@ -25,7 +25,7 @@
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "models/files/model_file.h"
-#include "models/inference/prepared/prepared.h"
+#include "models/inference/compiled/compiled_model.h"
 #include "models/networks/cost.h"
 #include "models/training/trainer.h"
 
@@ -102,7 +102,7 @@ WindowSet sliding_bumps(const SuperTacSettings& model) {
     r.time_s.push_back(time);
     r.position_mm.insert(r.position_mm.end(), {18, static_cast<float>(y)});
     for (int k = 0; k < kTaxels; ++k)
-      r.volts.push_back(static_cast<float>(2.44 - 0.1 * plate.height(18, y - 4.5 + 3 * (k / 4))));
+      r.signals.push_back(static_cast<float>(2.44 - 0.1 * plate.height(18, y - 4.5 + 3 * (k / 4))));
   }
   windows.add(r);
   return windows;
@@ -117,7 +117,7 @@ std::vector<std::uint32_t> all_of(const WindowSet& windows) {
 class Ours {
  public:
   Ours(const std::string& model, const std::string& windows)
-      : model_(load_model(model).model), prepared_(*model_), windows_(read_windows(windows)) {}
+      : model_(load_model(model).model), compiled_(*model_), windows_(read_windows(windows)) {}
 
   std::string answer(const std::string& order) {
     std::istringstream words(order);
@@ -133,7 +133,7 @@ class Ours {
     if (what == "infer" && words >> number >> seconds && number <= windows_.dim(0)) {
       omp_set_num_threads(1);
       const Tensor batch = first_windows(number);
-      return timed(seconds, [&] { prepared_.estimate(batch); });
+      return timed(seconds, [&] { compiled_.estimate(batch); });
     }
     if (what == "train" && words >> number >> seconds) {
       omp_set_num_threads(number);
@@ -145,7 +145,7 @@ class Ours {
     if (what == "each" && words >> number >> file) {
       omp_set_num_threads(1);
       const Tensor window = first_windows(1);
-      return each(number, file, [&] { prepared_.estimate(window); });
+      return each(number, file, [&] { compiled_.estimate(window); });
     }
     if (what == "spin" && words >> number >> file)
       return each(number, file, [] {
@@ -171,7 +171,7 @@ class Ours {
   }
 
   std::string pictures(const std::string& path) {
-    const Tensor pictures = prepared_.estimate(windows_).picture;
+    const Tensor pictures = compiled_.estimate(windows_).picture;
     const auto height = static_cast<std::uint64_t>(model_->settings().image_height());
     const auto width = static_cast<std::uint64_t>(model_->settings().image_width());
     write_safetensors(path, {},
@@ -243,7 +243,7 @@ class Ours {
   }
 
   std::unique_ptr<SuperTac> model_;
-  Prepared prepared_;
+  CompiledModel compiled_;
   Tensor windows_;
   std::unique_ptr<WindowSet> data_;
   std::map<int, std::unique_ptr<Trainer>> trainers_;  // by batch

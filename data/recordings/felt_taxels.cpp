@@ -14,13 +14,13 @@ void FeltTaxels::add(const Recording& recording) {
   if (low_.empty()) {
     array_ = recording.array, span_ = std::abs(recording.signal_scale.span);
     flat_ = recording.body.value_or(Body::usual(array_)).shape == BodyShape::flat;
-    low_.assign(recording.volts.begin(), recording.volts.begin() + static_cast<std::ptrdiff_t>(signals));
+    low_.assign(recording.signals.begin(), recording.signals.begin() + static_cast<std::ptrdiff_t>(signals));
     high_ = low_;
   }
   if (recording.array != array_) return;
-  for (std::size_t i = 0; i < recording.volts.size(); ++i) {
-    low_[i % signals] = std::min(low_[i % signals], recording.volts[i]);
-    high_[i % signals] = std::max(high_[i % signals], recording.volts[i]);
+  for (std::size_t i = 0; i < recording.signals.size(); ++i) {
+    low_[i % signals] = std::min(low_[i % signals], recording.signals[i]);
+    high_[i % signals] = std::max(high_[i % signals], recording.signals[i]);
   }
 }
 

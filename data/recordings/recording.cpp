@@ -54,7 +54,7 @@ std::optional<std::string> problem_of(const Recording& recording) {
            std::to_string(expected) + " for " + std::to_string(n) + " frames";
   };
   const std::size_t signals = recording.array.signals();
-  if (recording.volts.size() != n * signals) return sizes("signals", recording.volts.size(), n * signals);
+  if (recording.signals.size() != n * signals) return sizes("signals", recording.signals.size(), n * signals);
   if (!recording.position_mm.empty() && recording.position_mm.size() != n * 2) {
     return sizes("position_mm", recording.position_mm.size(), n * 2);
   }
@@ -67,9 +67,9 @@ std::optional<std::string> problem_of(const Recording& recording) {
     }
   }
   const auto finite = [](float value) { return std::isfinite(value); };
-  const auto volt = std::find_if_not(recording.volts.begin(), recording.volts.end(), finite);
-  if (volt != recording.volts.end()) {
-    const auto index = volt - recording.volts.begin();
+  const auto volt = std::find_if_not(recording.signals.begin(), recording.signals.end(), finite);
+  if (volt != recording.signals.end()) {
+    const auto index = volt - recording.signals.begin();
     return "signals are not finite at frame " + std::to_string(static_cast<std::size_t>(index) / signals) +
            ", taxel " +
            std::to_string(static_cast<int>(static_cast<std::size_t>(index) % signals) /
@@ -130,7 +130,7 @@ double Recording::began_s() const { return parse_double(value_or(metadata, "bega
 
 void restate(Recording& recording, const SignalScale& scale) {
   if (recording.signal_scale == scale) return;
-  for (float& volts : recording.volts)
+  for (float& volts : recording.signals)
     volts = static_cast<float>(recording.signal_scale.in(scale, double{volts}));
   recording.signal_scale = scale;
 }
@@ -174,7 +174,7 @@ Recording recording_of(const SafetensorsFile& file) {
               ", which nobody reads; expected time_s, signals (or volts) and, where known, position_mm, "
               "lift_mm and truth: rename it or leave it out");
   recording.time_s = file.f64("time_s");
-  recording.volts = file.f32(signals_tensor(file));
+  recording.signals = file.f32(signals_tensor(file));
   const std::uint64_t n = recording.frames();
   check_shape(file, "time_s", {n});
   check_shape(file, signals_tensor(file), {n, recording.array.signals()});
@@ -207,7 +207,7 @@ void write_recording(const std::string& path, const Recording& recording) {
                                         {signals_tensor(recording.signal_scale),
                                          "F32",
                                          {n, recording.array.signals()},
-                                         std::as_bytes(std::span(recording.volts))}};
+                                         std::as_bytes(std::span(recording.signals))}};
   if (!recording.position_mm.empty()) {
     tensors.push_back({"position_mm", "F32", {n, 2}, std::as_bytes(std::span(recording.position_mm))});
   }

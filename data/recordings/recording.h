@@ -16,7 +16,7 @@ inline constexpr double kLiftedMm = 0.1;
 /// One pass of the finger over a plate, at the rate it was recorded with.
 struct Recording {
   std::vector<double> time_s;  ///< n, strictly increasing
-  std::vector<float> volts;    ///< n x array.signals(), a frame together, in the unit of signal_scale
+  std::vector<float> signals;  ///< n x array.signals(), a frame together, in the unit of signal_scale
   std::vector<float>
       position_mm;  ///< n x 2: (x, y) of the finger's centre on the plate; empty, or NaN where unknown
   std::vector<float> lift_mm;  ///< n: how far the finger is above its slide; empty: it slides throughout

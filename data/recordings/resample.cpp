@@ -12,29 +12,29 @@ namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
-bool finite(std::span<const float> volts) {
-  return std::all_of(volts.begin(), volts.end(), [](float v) { return std::isfinite(v); });
+bool finite(std::span<const float> signals) {
+  return std::all_of(signals.begin(), signals.end(), [](float v) { return std::isfinite(v); });
 }
 
 std::span<const float> volts_of(const Recording& recording, std::size_t frame) {
   const std::size_t signals = recording.array.signals();
-  return std::span(recording.volts).subspan(frame * signals, signals);
+  return std::span(recording.signals).subspan(frame * signals, signals);
 }
 
 void check(const Recording& recording, const ResampleSettings& settings) {
-  const double span_volts = settings.scaling.value_or(Scaling{}).span_volts;
-  if (!(settings.rate_hz > 0) || !(settings.max_gap_s > 0) || !(std::abs(span_volts) > 0))
-    throw std::invalid_argument("resample: rate_hz and max_gap_s must be positive, span_volts not 0, got " +
+  const double span = settings.scaling.value_or(Scaling{}).span;
+  if (!(settings.rate_hz > 0) || !(settings.max_gap_s > 0) || !(std::abs(span) > 0))
+    throw std::invalid_argument("resample: rate_hz and max_gap_s must be positive, span not 0, got " +
                                 std::to_string(settings.rate_hz) + ", " + std::to_string(settings.max_gap_s) +
-                                " and " + std::to_string(span_volts));
+                                " and " + std::to_string(span));
   const std::size_t n = recording.time_s.size(), values = n * recording.array.signals();
   const std::size_t positions = recording.position_mm.size(), lifts = recording.lift_mm.size();
-  if (recording.volts.size() != values || (positions != 0 && positions != 2 * n) ||
+  if (recording.signals.size() != values || (positions != 0 && positions != 2 * n) ||
       (lifts != 0 && lifts != n))
     throw std::runtime_error("recording: " + std::to_string(n) + " time stamps need " +
                              std::to_string(values) + " voltages, 0 or " + std::to_string(2 * n) +
                              " coordinates and 0 or " + std::to_string(n) + " lifts, got " +
-                             std::to_string(recording.volts.size()) + ", " + std::to_string(positions) +
+                             std::to_string(recording.signals.size()) + ", " + std::to_string(positions) +
                              " and " + std::to_string(lifts) + "; record or import the pass again");
   for (std::size_t i = 0; i < n; ++i)
     if (!std::isfinite(recording.time_s[i]) || (i > 0 && recording.time_s[i] <= recording.time_s[i - 1]))
@@ -116,14 +116,14 @@ class Segment {
 
 }  // namespace
 
-float Scaling::operator()(float volts) const {
-  return static_cast<float>(std::clamp((rest_volts - volts) / span_volts, 0.0, 1.0));
+float Scaling::operator()(float signals) const {
+  return static_cast<float>(std::clamp((rest - signals) / span, 0.0, 1.0));
 }
 
-void Scaling::operator()(std::span<float> volts) const {
+void Scaling::operator()(std::span<float> signals) const {
   // The same in the form that the compiler makes vectors of.
-  const double rest = rest_volts, span = span_volts;
-  for (float& v : volts)
+  const double rest = this->rest, span = this->span;
+  for (float& v : signals)
     v = static_cast<float>(std::min(std::max((rest - static_cast<double>(v)) / span, 0.0), 1.0));
 }
 
@@ -132,12 +132,12 @@ void FrameMean::clear() {
   count_ = 0;
 }
 
-void FrameMean::add(std::span<const float> volts) {
-  for (std::size_t k = 0; k < sum_.size(); ++k) sum_[k] += volts[k];
+void FrameMean::add(std::span<const float> signals) {
+  for (std::size_t k = 0; k < sum_.size(); ++k) sum_[k] += signals[k];
   ++count_;
 }
 
-void FrameMean::volts(std::span<float> mean) const {
+void FrameMean::write(std::span<float> mean) const {
   for (std::size_t k = 0; k < sum_.size(); ++k)
     mean[k] = static_cast<float>(sum_[k] / static_cast<double>(count_));
 }

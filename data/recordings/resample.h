@@ -12,11 +12,11 @@ namespace supertac {
 /// Scales a signal to [0,1], 1 = pressed hard: clip((rest - V) / span, 0, 1). The span is below 0 where
 /// pressing raises the signal.
 struct Scaling {
-  double rest_volts = SignalScale{}.rest, span_volts = SignalScale{}.span;
+  double rest = SignalScale{}.rest, span = SignalScale{}.span;
   bool per_window = false;  ///< each window is then brought to its own rest and gain: normalise_window()
-  float operator()(float volts) const;
+  float operator()(float signals) const;
   /// Scales every value in place.
-  void operator()(std::span<float> volts) const;
+  void operator()(std::span<float> signals) const;
 };
 
 /// Mean of some frames, summed in double precision in the order they are added.
@@ -25,9 +25,9 @@ class FrameMean {
   /// `signals`: in a frame.
   explicit FrameMean(std::size_t signals) : sum_(signals) {}
   void clear();
-  void add(std::span<const float> volts);
+  void add(std::span<const float> signals);
   /// Of at least one frame.
-  void volts(std::span<float> mean) const;
+  void write(std::span<float> mean) const;
 
  private:
   std::vector<double> sum_;
@@ -60,14 +60,14 @@ class Resampler {
   /// every sample that it changes, in their order: those before it without a frame, and its own as far as its
   /// frames have come.
   template <class Give>
-  void add(double time_s, std::span<const float> volts, const Give& give) {
+  void add(double time_s, std::span<const float> signals, const Give& give) {
     if (samples_ == 0) begin_s_ = time_s;
     const std::size_t j = sample_at(time_s - begin_s_, rate_hz_);
     if (samples_ <= j) mean_.clear();
     for (; samples_ < j; ++samples_) give(samples_, std::span<const float>(newest_));
     samples_ = j + 1;
-    mean_.add(volts);
-    mean_.volts(newest_);
+    mean_.add(signals);
+    mean_.write(newest_);
     if (scaling_) (*scaling_)(newest_);
     give(j, std::span<const float>(newest_));
   }

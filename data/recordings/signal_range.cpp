@@ -43,7 +43,7 @@ SignalRange SignalRange::of_folder(const std::string& dir, const std::vector<std
     if (!plates.empty() && std::ranges::find(plates, recording.plate) == plates.end()) continue;
     // Older ones state none: theirs is the rig's.
     if (!any_signals && recording.signal_scale != SignalScale{})
-      if (const std::string why = contradiction(recording.volts, recording.signal_scale); !why.empty())
+      if (const std::string why = contradiction(recording.signals, recording.signal_scale); !why.empty())
         throw FileError(
             paths[i], "has signals " + why + "; import it anew with the file of its sensor, or give --range");
     range.add(recording);
@@ -53,13 +53,12 @@ SignalRange SignalRange::of_folder(const std::string& dir, const std::vector<std
 
 void SignalRange::add(const Recording& recording) {
   felt_.add(recording);
-  if (values_.empty())
-    stated_ = {.rest_volts = recording.signal_scale.rest, .span_volts = recording.signal_scale.span};
+  if (values_.empty()) stated_ = {.rest = recording.signal_scale.rest, .span = recording.signal_scale.span};
   const std::size_t signals = recording.array.signals(), frames = recording.frames();
   const std::size_t apart = factor_ * std::clamp(frames / kLeastFrames, std::size_t{1}, kFarthest);
   for (; next_ < frames; next_ += apart)
     for (std::size_t k = 0; k < signals; ++k) {
-      const float value = recording.volts[next_ * signals + k];
+      const float value = recording.signals[next_ * signals + k];
       if (std::isfinite(value)) values_.push_back(value);
     }
   sorted_ = false;
@@ -84,7 +83,7 @@ const std::vector<float>& SignalRange::values() const {
 double SignalRange::clipped(const Scaling& s) const {
   if (values_.empty()) return 0;
   const std::vector<float>& sorted = values();
-  const double pressed = s.rest_volts - s.span_volts, beyond_rest = s.rest_volts + kAboveRest * s.span_volts;
+  const double pressed = s.rest - s.span, beyond_rest = s.rest + kAboveRest * s.span;
   const auto below = std::ranges::lower_bound(sorted, std::min(pressed, beyond_rest)) - sorted.begin();
   const auto above = sorted.end() - std::ranges::upper_bound(sorted, std::max(pressed, beyond_rest));
   return static_cast<double>(below + above) / static_cast<double>(sorted.size());
@@ -97,11 +96,10 @@ double SignalRange::level(double share) const {
 Scaling SignalRange::fitted() const {
   if (values_.empty()) return stated_;
   const double low = level(kTail), high = level(1 - kTail);
-  if (clipped(stated_) <= kMostClipped && high - low >= kLeastFilled * std::abs(stated_.span_volts))
-    return stated_;
+  if (clipped(stated_) <= kMostClipped && high - low >= kLeastFilled * std::abs(stated_.span)) return stated_;
   const double span = std::max(kMargin * (high - low), 1e-6);
-  if (stated_.span_volts < 0) return {.rest_volts = low, .span_volts = -span};
-  return {.rest_volts = high, .span_volts = span};
+  if (stated_.span < 0) return {.rest = low, .span = -span};
+  return {.rest = high, .span = span};
 }
 
 std::string SignalRange::text() const {

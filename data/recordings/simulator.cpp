@@ -152,7 +152,7 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
     const FingerPose pose = pose_at(stamp, pass);
     recording.time_s.push_back(stamp);
     for (const double v : volts)
-      recording.volts.push_back(static_cast<float>(
+      recording.signals.push_back(static_cast<float>(
           settings.with_saturation ? std::clamp(v, rig::kFloorVolts, rig::kCeilingVolts) : v));
     recording.position_mm.push_back(static_cast<float>(pose.x_mm));
     recording.position_mm.push_back(static_cast<float>(pose.y_mm));

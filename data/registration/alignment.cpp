@@ -34,7 +34,7 @@ void standardise(std::array<double, kProfilePoints>& row) {
   for (double& v : row) v = flat ? kUnknown : (v - mean) / deviation;
 }
 
-// The signals of a pass, prepared for many calls of along().
+// The signals of a pass, made ready for many calls of along().
 class PassSignals {
  public:
   // Those between the registration's valid_from_s and valid_until_s.
@@ -48,7 +48,7 @@ class PassSignals {
       std::vector<double> pressed(time_s_.size());
       for (std::size_t i = 0; i < pressed.size(); ++i)
         for (std::size_t column = 0; column < kColumns; ++column) {
-          const float v = recording.volts[(first + i) * kTaxels + row * kColumns + column];
+          const float v = recording.signals[(first + i) * kTaxels + row * kColumns + column];
           pressed[i] += std::isfinite(v) ? Scaling{}(v) / kColumns : 0;
         }
       sum_[row].assign(pressed.size() + 1, 0);

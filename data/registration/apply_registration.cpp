@@ -29,14 +29,14 @@ void fill_loss(const Registration& registration, Recording& recording) {
     const double part = static_cast<double>(k + 1) / static_cast<double>(lost + 1);
     times[k] = time[at - 1] + part * gap;
     for (std::size_t s = 0; s < signals; ++s)
-      volts[k * signals + s] = std::lerp(recording.volts[(at - 1) * signals + s],
-                                         recording.volts[at * signals + s], static_cast<float>(part));
+      volts[k * signals + s] = std::lerp(recording.signals[(at - 1) * signals + s],
+                                         recording.signals[at * signals + s], static_cast<float>(part));
     places[2 * k] = recording.position_mm[0];
   }
   const auto before = static_cast<std::ptrdiff_t>(at);
   time.insert(time.begin() + before, times.begin(), times.end());
-  recording.volts.insert(recording.volts.begin() + before * static_cast<std::ptrdiff_t>(signals),
-                         volts.begin(), volts.end());
+  recording.signals.insert(recording.signals.begin() + before * static_cast<std::ptrdiff_t>(signals),
+                           volts.begin(), volts.end());
   recording.position_mm.insert(recording.position_mm.begin() + 2 * before, places.begin(), places.end());
 }
 

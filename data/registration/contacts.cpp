@@ -22,7 +22,7 @@ std::vector<double> binned(const Recording& recording, int taxel, std::size_t bi
   std::vector<double> sum(bins), count(bins);
   for (std::size_t i = 0; i < recording.frames(); ++i) {
     const float* const signals =
-        recording.volts.data() + i * recording.array.signals() + static_cast<std::size_t>(taxel) * channels;
+        recording.signals.data() + i * recording.array.signals() + static_cast<std::size_t>(taxel) * channels;
     double volts = 0;
     for (std::size_t c = 0; c < channels; ++c) volts += signals[c];
     volts /= static_cast<double>(channels);
@@ -102,10 +102,10 @@ void find_in(const std::vector<double>& x, int taxel, double start_s, double rea
 std::vector<Contact> find_contacts(const Recording& recording, double reach_s) {
   const std::size_t n = recording.frames();
   const std::size_t signals = recording.array.signals();
-  if (recording.volts.size() != n * signals)
+  if (recording.signals.size() != n * signals)
     throw std::invalid_argument("find_contacts: " + std::to_string(n) + " frames need " +
                                 std::to_string(n * signals) + " signals, got " +
-                                std::to_string(recording.volts.size()));
+                                std::to_string(recording.signals.size()));
   std::vector<Contact> found;
   if (n < 3) return found;
   const double duration = recording.time_s.back() - recording.time_s.front();

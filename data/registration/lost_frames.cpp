@@ -25,8 +25,8 @@ constexpr std::size_t kBurstNeighbours = 100;
 // Of one signal.
 double step_before(const Recording& recording, std::size_t i, std::size_t s) {
   const std::size_t n = recording.array.signals();
-  return static_cast<double>(recording.volts[i * n + s]) -
-         static_cast<double>(recording.volts[(i - 1) * n + s]);
+  return static_cast<double>(recording.signals[i * n + s]) -
+         static_cast<double>(recording.signals[(i - 1) * n + s]);
 }
 
 struct Usual {
@@ -74,7 +74,8 @@ std::vector<double> changes(const Recording& recording) {
   std::vector<double> change(recording.frames());
   for (std::size_t i = 1; i < change.size(); ++i)
     for (std::size_t s = 0; s < signals; ++s) {
-      const double step = std::abs(recording.volts[i * signals + s] - recording.volts[(i - 1) * signals + s]);
+      const double step =
+          std::abs(recording.signals[i * signals + s] - recording.signals[(i - 1) * signals + s]);
       if (std::isfinite(step)) change[i] += share * step;
     }
   return change;

@@ -14,11 +14,10 @@ void check(const LiveWindowSettings& s) {
   const auto fail = [](const std::string& what) { throw std::invalid_argument("live window: " + what); };
   if (s.signals < 1) fail("a frame must have at least 1 signal");
   if (s.timesteps < 1) fail("timesteps must be at least 1, got " + std::to_string(s.timesteps));
-  if (!(s.rate_hz > 0) || !(s.frame_period_s > 0) || !(s.max_gap_s > 0) ||
-      !(std::abs(s.scaling.span_volts) > 0))
-    fail("rate_hz, frame_period_s and max_gap_s must be positive, span_volts not 0, got " +
+  if (!(s.rate_hz > 0) || !(s.frame_period_s > 0) || !(s.max_gap_s > 0) || !(std::abs(s.scaling.span) > 0))
+    fail("rate_hz, frame_period_s and max_gap_s must be positive, span not 0, got " +
          std::to_string(s.rate_hz) + ", " + std::to_string(s.frame_period_s) + ", " +
-         std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span_volts));
+         std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span));
   if (!(s.filter_s >= 0)) fail("filter_s must not be negative, got " + std::to_string(s.filter_s));
 }
 
@@ -37,12 +36,12 @@ LiveWindow::LiveWindow(const LiveWindowSettings& settings)
       mean_(settings.signals),
       average_(settings.signals) {}
 
-void LiveWindow::push(double time_s, std::span<const float> volts) {
-  if (volts.size() != settings_.signals)
+void LiveWindow::push(double time_s, std::span<const float> frame) {
+  if (frame.size() != settings_.signals)
     throw std::invalid_argument("live window: a frame has " + std::to_string(settings_.signals) +
-                                " signals, got " + std::to_string(volts.size()));
+                                " signals, got " + std::to_string(frame.size()));
   if (!std::isfinite(time_s) ||
-      !std::all_of(volts.begin(), volts.end(), [](float v) { return std::isfinite(v); })) {
+      !std::all_of(frame.begin(), frame.end(), [](float v) { return std::isfinite(v); })) {
     ++counters_.damaged;
     return;
   }
@@ -57,27 +56,27 @@ void LiveWindow::push(double time_s, std::span<const float> volts) {
   ++counters_.frames;
   newest_s_ = time_s;
   if (settings_.filter_s > 0) {
-    average(time_s, volts);
-    volts = average_;
+    average(time_s, frame);
+    frame = average_;
   }
   if (settings_.timesteps == 1) resampler_.restart();  // each frame as it is, as WindowSet has it
-  resampler_.add(time_s, volts, [&](std::size_t j, std::span<const float> sample) {
+  resampler_.add(time_s, frame, [&](std::size_t j, std::span<const float> sample) {
     const std::size_t slot = j % static_cast<std::size_t>(settings_.timesteps);
     std::ranges::copy(sample, ring_.begin() + static_cast<std::ptrdiff_t>(slot * settings_.signals));
   });
 }
 
-void LiveWindow::average(double time_s, std::span<const float> volts) {
+void LiveWindow::average(double time_s, std::span<const float> frame) {
   const double span_s = std::max(0.0, settings_.filter_s - 0.5 * settings_.frame_period_s);
   const auto old = std::ranges::lower_bound(recent_s_, time_s - span_s) - recent_s_.begin();
   recent_s_.erase(recent_s_.begin(), recent_s_.begin() + old);
-  recent_.erase(recent_.begin(), recent_.begin() + old * static_cast<std::ptrdiff_t>(volts.size()));
+  recent_.erase(recent_.begin(), recent_.begin() + old * static_cast<std::ptrdiff_t>(frame.size()));
   recent_s_.push_back(time_s);
-  recent_.insert(recent_.end(), volts.begin(), volts.end());
+  recent_.insert(recent_.end(), frame.begin(), frame.end());
   mean_.clear();
-  for (std::size_t at = 0; at < recent_.size(); at += volts.size())
-    mean_.add(std::span(recent_).subspan(at, volts.size()));
-  mean_.volts(average_);
+  for (std::size_t at = 0; at < recent_.size(); at += frame.size())
+    mean_.add(std::span(recent_).subspan(at, frame.size()));
+  mean_.write(average_);
 }
 
 bool LiveWindow::window(std::span<float> out) const {

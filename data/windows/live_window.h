@@ -43,7 +43,7 @@ class LiveWindow {
   explicit LiveWindow(const LiveWindowSettings& settings);
 
   /// Throws std::invalid_argument when the frame has another number of signals.
-  void push(double time_s, std::span<const float> volts);
+  void push(double time_s, std::span<const float> frame);
 
   /// The window that ends with the newest frame, [T][signals], oldest sample first. False, and `out`
   /// untouched, before a run without gap spans T samples. Throws std::invalid_argument when `out` has
@@ -53,7 +53,7 @@ class LiveWindow {
   const Counters& counters() const { return counters_; }
 
  private:
-  void average(double time_s, std::span<const float> volts);
+  void average(double time_s, std::span<const float> frame);
 
   LiveWindowSettings settings_;
   Resampler resampler_;

@@ -100,8 +100,8 @@ Recording silent_pass(const RandomStream& random, const WindowSettings& windows,
       const double slope = drift * (2 * random.uniform(kTaxels + 2 * k + 1) - 1);
       const double x = pressed * random.uniform(kTaxels + 2 * k) + slope * windows_past +
                        noise * random.normal(kSamples + t * signals + k);
-      recording.volts.push_back(static_cast<float>(windows.scaling.rest_volts -
-                                                   windows.scaling.span_volts * std::clamp(x, 0.0, 1.0)));
+      recording.signals.push_back(
+          static_cast<float>(windows.scaling.rest - windows.scaling.span * std::clamp(x, 0.0, 1.0)));
     }
     recording.position_mm.push_back(static_cast<float>(Plate::kWidthMm / 2));
     recording.position_mm.push_back(static_cast<float>(Plate::kLengthMm / 2));

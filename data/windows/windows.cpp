@@ -27,9 +27,9 @@ void check(const WindowSettings& s) {
   if (s.scale != 2 && s.scale != 4 && s.scale != 8 && s.scale != 16)
     fail("scale must be 2, 4, 8 or 16, got " + std::to_string(s.scale));
   if (s.stride < 1) fail("stride must be at least 1, got " + std::to_string(s.stride));
-  if (!(s.rate_hz > 0) || !(s.max_gap_s > 0) || !(std::abs(s.scaling.span_volts) > 0))
-    fail("rate_hz and max_gap_s must be positive, span_volts not 0, got " + std::to_string(s.rate_hz) + ", " +
-         std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span_volts));
+  if (!(s.rate_hz > 0) || !(s.max_gap_s > 0) || !(std::abs(s.scaling.span) > 0))
+    fail("rate_hz and max_gap_s must be positive, span not 0, got " + std::to_string(s.rate_hz) + ", " +
+         std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span));
 }
 
 // Pressed as deep as rigs press it, it is clear of the plate when lifted by so much more than the highest

@@ -118,7 +118,7 @@ CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const Pos
     }
     pass.time_s.push_back(time - track.begin());
     const auto frame = std::span(all.signals).subspan(i * signals, signals);
-    pass.volts.insert(pass.volts.end(), frame.begin(), frame.end());
+    pass.signals.insert(pass.signals.end(), frame.begin(), frame.end());
     const Point3 p = track.at(time);
     pass.position.insert(pass.position.end(), {p.x, p.y, p.z});
     pass.suspect.push_back(all.suspect[i]);

@@ -28,7 +28,7 @@ struct CollectedPass {
   double measured_speed = 0;          ///< of the slide; 0: nothing tells
   bool complete = false;              ///< the release was verified
   std::vector<double> time_s;         ///< n
-  std::vector<float> volts;           ///< n x array.signals(), a frame together, in the sensor's unit
+  std::vector<float> signals;         ///< n x array.signals(), a frame together, in the sensor's unit
   std::vector<double> position;       ///< n x 3, printer coordinates of the head (mm)
   std::vector<std::uint8_t> suspect;  ///< n; 1: may be torn, or an implausible jump
   std::uint64_t missing = 0;          ///< frames that did not arrive between the first and the last

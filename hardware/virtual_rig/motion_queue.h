@@ -1,5 +1,5 @@
-// The planner of the virtual printer: straight moves with acceleration, one after the other, each stopping at
-// its end. A move that finds the queue empty starts late.
+// The compiler of the virtual printer: straight moves with acceleration, one after the other, each stopping
+// at its end. A move that finds the queue empty starts late.
 #pragma once
 
 #include <cstddef>

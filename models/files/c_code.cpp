@@ -14,7 +14,7 @@
 #include "io/numbers/numbers.h"
 #include "io/numbers/sha256.h"
 #include "io/numbers/text.h"
-#include "models/inference/prepared/integer_plan.h"
+#include "models/inference/compiled/integer_plan.h"
 
 namespace supertac {
 namespace {
@@ -188,13 +188,13 @@ std::string self_test_hash(const ModelFile& file, double sensor_hz) {
   for (Dim i = 0, n = self_test_frames(file, sensor_hz); i < n; ++i) {
     for (float& value : frame) {
       random = random * 1664525U + 1013904223U;
-      value = static_cast<float>(w.scaling.rest_volts - w.scaling.span_volts * ((random >> 8) * 0x1p-24));
+      value = static_cast<float>(w.scaling.rest - w.scaling.span * ((random >> 8) * 0x1p-24));
     }
     if (i != n / 2) live.push(static_cast<double>(i) * period, frame);
   }
   Tensor window(file.model->input_shape(1));
   live.window(window.values());
-  const Estimate drawn = prepared(file, Precision::int8).estimate(window);
+  const Estimate drawn = compiled(file, Precision::int8).estimate(window);
   Sha256 hash;
   hash.add(std::as_bytes(drawn.picture.values()));
   if (file.model->settings().predicted_error) hash.add(std::as_bytes(drawn.predicted_error.values()));
@@ -243,8 +243,8 @@ std::string window_constants(const ModelFile& file, double sensor_hz) {
          define("CELL_SLACK", number(kCellSlack), "of a sample: time stamps are rounded") +
          define("RAW_SPAN_S", number(raw_span), "of the moving average") +
          define("RAW_FRAMES", filter > 0 ? frames(raw_span) : "0") +
-         define("REST", number(w.scaling.rest_volts), "a sample is (REST - value) / SPAN, 0 to 1") +
-         define("SPAN", number(w.scaling.span_volts)) +
+         define("REST", number(w.scaling.rest), "a sample is (REST - value) / SPAN, 0 to 1") +
+         define("SPAN", number(w.scaling.span)) +
          define("NORMALISED", w.scaling.per_window ? "1" : "0",
                 "windows are brought to their own rest and gain") +
          define("SELF_TEST_FRAMES", text(self_test_frames(file, sensor_hz))) +

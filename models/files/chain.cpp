@@ -4,7 +4,7 @@
 #include "io/files/provenance.h"
 #include "io/numbers/sha256.h"
 #include "io/numbers/text.h"
-#include "models/inference/prepared/integer_plan.h"
+#include "models/inference/compiled/integer_plan.h"
 
 namespace supertac {
 namespace {

@@ -54,9 +54,9 @@ InputSettings read_input(JsonObject entry) {
       filtered ? std::optional(entry.number("filter_s")) : std::nullopt,
       pitch_of(entry, InputSettings{}.pitch_mm),
       signals != nullptr ? scale_of({*signals, entry.where()}) : SignalScale{}};
-  const double span = std::abs(input.scaling.span_volts);
-  if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest_volts) > 2e9 ||
-      span <= 1e-6 || span > 2e9 || input.filter_s.value_or(0) < 0 || input.filter_s.value_or(0) > 10 ||
+  const double span = std::abs(input.scaling.span);
+  if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest) > 2e9 || span <= 1e-6 ||
+      span > 2e9 || input.filter_s.value_or(0) < 0 || input.filter_s.value_or(0) > 10 ||
       std::min(input.pitch_mm.x, input.pitch_mm.y) < 0.1 ||
       std::max(input.pitch_mm.x, input.pitch_mm.y) > 100) {
     throw std::runtime_error(
@@ -108,8 +108,8 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
     settings["in_channels"] = s.in_channels;
   }
   Json scaling = {{"rate_hz", input.rate_hz},
-                  {"rest_volts", input.scaling.rest_volts},
-                  {"span_volts", input.scaling.span_volts},
+                  {"rest_volts", input.scaling.rest},
+                  {"span_volts", input.scaling.span},
                   {"filter_s", input.filter_s ? Json(*input.filter_s) : Json(nullptr)},
                   {"formula", "clip((rest_volts - V) / span_volts, 0, 1)"}};
   if (input.scaling.per_window) scaling["levelled"] = true;
@@ -213,14 +213,14 @@ Precision precision_of(const std::string& name) {
 
 std::string name_of(Precision precision) { return precision == Precision::int8 ? "int8" : "fp32"; }
 
-Prepared prepared(const ModelFile& file, Precision precision) {
-  if (precision == Precision::fp32) return Prepared(*file.model);
-  return Prepared(*file.model, file.int8_ranges());
+CompiledModel compiled(const ModelFile& file, Precision precision) {
+  if (precision == Precision::fp32) return CompiledModel(*file.model);
+  return CompiledModel(*file.model, file.int8_ranges());
 }
 
 Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision) {
-  std::vector<Prepared> members;
-  for (const ModelFile& file : files) members.push_back(prepared(file, precision));
+  std::vector<CompiledModel> members;
+  for (const ModelFile& file : files) members.push_back(compiled(file, precision));
   return Ensemble(std::move(members));
 }
 

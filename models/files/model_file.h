@@ -10,10 +10,10 @@
 
 #include "data/windows/windows.h"
 #include "layers/checkpoint.h"
+#include "models/inference/compiled/ranges.h"
 #include "models/inference/ensemble.h"
 #include "models/inference/interval.h"
 #include "models/inference/novelty.h"
-#include "models/inference/prepared/ranges.h"
 #include "models/networks/supertac_model.h"
 
 namespace supertac {
@@ -73,15 +73,15 @@ std::vector<ModelFile> load_models(std::span<const std::string> paths);
 enum class Precision {
   fp32,
   int8,  ///< bytes, as on a microcontroller: the pictures differ a little
-         ///< (models/inference/prepared/prepared.h)
+         ///< (models/inference/compiled/compiled_model.h)
 };
 /// "fp32" or "int8". Throws std::invalid_argument.
 Precision precision_of(const std::string& name);
 std::string name_of(Precision precision);
 
 /// The model of a file, and the ensemble of several, which must outlive what draws with them. Throw as
-/// Prepared and Ensemble, and std::runtime_error when a file has no ranges for int8.
-Prepared prepared(const ModelFile& file, Precision precision);
+/// CompiledModel and Ensemble, and std::runtime_error when a file has no ranges for int8.
+CompiledModel compiled(const ModelFile& file, Precision precision);
 Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision = Precision::fp32);
 
 /// Parameters and metadata, without ranges and novelty; trainings write by save_trained()

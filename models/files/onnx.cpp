@@ -64,8 +64,8 @@ std::string Exporter::numbers(const Ints& values) {
 
 // In single precision, since converters know no other.
 std::string Exporter::scaled(const ModelFile& file) {
-  const auto rest = static_cast<float>(file.input.scaling.rest_volts),
-             span = static_cast<float>(file.input.scaling.span_volts);
+  const auto rest = static_cast<float>(file.input.scaling.rest),
+             span = static_cast<float>(file.input.scaling.span);
   const std::string below = graph.node("Sub", {number(rest), "volts"}, "below_rest");
   const std::string share = graph.node("Div", {below, number(span)}, "share_of_span");
   return graph.node("Clip", {share, number(0), number(1)}, "scaled");
@@ -74,12 +74,11 @@ std::string Exporter::scaled(const ModelFile& file) {
 // For each bin of 1/256 the last volts, from pressed hard to not at all, that Scaling counts in it or in a
 // higher one: bins by comparison, which no rounding of the runtime's can change.
 void Exporter::bin_edges(const Scaling& scaling) {
-  const float away = scaling.span_volts > 0 ? HUGE_VALF : -HUGE_VALF;
+  const float away = scaling.span > 0 ? HUGE_VALF : -HUGE_VALF;
   std::vector<float> edges(256);
   for (std::size_t bin = 0; bin < edges.size(); ++bin) {
     const float least = static_cast<float>(bin) / 256;
-    float& v = edges[bin] =
-        static_cast<float>(scaling.rest_volts - scaling.span_volts * static_cast<double>(least));
+    float& v = edges[bin] = static_cast<float>(scaling.rest - scaling.span * static_cast<double>(least));
     while (bin > 0 && scaling(v) >= least) v = std::nextafter(v, away);
     while (scaling(v) < least) v = std::nextafter(v, -away);
   }
@@ -99,7 +98,7 @@ std::string Exporter::percentile(const Scaling& scaling, const std::string& name
     const std::string place = graph.node("Cast", {bin}, bit + "_place", {{"to", kI64}});
     const std::string edge = graph.node("Gather", {"bin_edges", place}, bit + "_edge");
     const std::string less =
-        graph.node(scaling.span_volts > 0 ? "Greater" : "Less", {"volts", edge}, bit + "_below");
+        graph.node(scaling.span > 0 ? "Greater" : "Less", {"volts", edge}, bit + "_below");
     const std::string ones = graph.node("Cast", {less}, bit + "_ones", {{"to", kF32}});
     const std::string count =
         graph.node("ReduceSum", {ones, numbers({1})}, bit + "_count", {{"keepdims", std::int64_t{1}}});
@@ -226,8 +225,8 @@ void Exporter::output(const char* name, const Variable& y, const char* about) {
 std::string Exporter::picture_of(const ModelFile& file) {
   const Network& network = *file.model;
   for (const Parameter& p : network.parameters()) parameters_.emplace(p.value.node(), to_stored(p));
-  const TracedDrawing traced(network, Tensor::zeros(network.input_shape(1)));
-  const Drawing& drawn = traced.drawn;
+  const TracedPrediction traced(network, Tensor::zeros(network.input_shape(1)));
+  const Prediction& drawn = traced.drawn;
   names_[traced.input.node()] = network_input(file);
   for (const TracedOp& op : traced.trace.ops()) names_[op.y.node()] = made(op);
   output("picture", drawn.picture, "Heights over the flat plate, 0 to 1; row grows with y, column with x.");

@@ -18,9 +18,9 @@ std::string text(const NetworkFormat& f) {
 
 static double square(real x) { return static_cast<double>(x) * static_cast<double>(x); }
 
-Ensemble::Ensemble(std::vector<Prepared> members) : members_(std::move(members)) {
+Ensemble::Ensemble(std::vector<CompiledModel> members) : members_(std::move(members)) {
   if (members_.empty()) throw std::invalid_argument("Ensemble: expected at least one network, got none");
-  for (const Prepared& member : members_)
+  for (const CompiledModel& member : members_)
     if (member.network().format() != first().format())
       throw std::invalid_argument("Ensemble: expected networks of one format, got one of " +
                                   text(first().format()) + " and one of " + text(member.network().format()));

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "models/inference/prepared/prepared.h"
+#include "models/inference/compiled/compiled_model.h"
 
 namespace supertac {
 
@@ -17,7 +17,7 @@ class Ensemble {
  public:
   /// Throws std::invalid_argument when there is none, or when they differ in the inputs that they take or in
   /// the pictures that they draw.
-  explicit Ensemble(std::vector<Prepared> members);
+  explicit Ensemble(std::vector<CompiledModel> members);
 
   const Network& first() const { return members_.front().network(); }
   /// The members' pictures are added in their order. predicted_error^2 is the mean of their predicted_error^2
@@ -27,7 +27,7 @@ class Ensemble {
   Tensor infer(const Tensor& inputs) const { return estimate(inputs).picture; }
 
  private:
-  std::vector<Prepared> members_;
+  std::vector<CompiledModel> members_;
 };
 
 }  // namespace supertac

@@ -22,7 +22,7 @@ struct Estimate {
 };
 
 /// The same on the graph.
-struct Drawing {
+struct Prediction {
   Variable picture, predicted_error, latents;
 };
 
@@ -43,9 +43,9 @@ class Network : public Module {
     return {count, f.rows * f.scale, f.columns * f.scale, 1};
   }
   /// Throws std::invalid_argument unless inputs have the input_shape() of some count.
-  virtual Drawing draw(const Variable& inputs) const = 0;
-  /// The same without recording. For many pictures use Prepared (models/inference/prepared/prepared.h), which
-  /// is faster.
+  virtual Prediction draw(const Variable& inputs) const = 0;
+  /// The same without recording. For many pictures use CompiledModel
+  /// (models/inference/compiled/compiled_model.h), which is faster.
   Estimate estimate(const Tensor& inputs) const;
   /// The pictures alone, [N,rows scale,columns scale,1].
   Tensor infer(const Tensor& inputs) const { return estimate(inputs).picture; }
@@ -53,7 +53,7 @@ class Network : public Module {
 
 inline Estimate Network::estimate(const Tensor& inputs) const {
   const NoGrad no_grad;
-  const Drawing drawn = draw(Variable(inputs));
+  const Prediction drawn = draw(Variable(inputs));
   const auto value = [](const Variable& x) { return x.defined() ? x.value() : Tensor(); };
   return {.picture = drawn.picture.value(),
           .predicted_error = value(drawn.predicted_error),
@@ -61,13 +61,14 @@ inline Estimate Network::estimate(const Tensor& inputs) const {
 }
 
 /// One inference on these inputs, unrecorded, and the ops that it ran. One of a thread at a time, as Trace.
-struct TracedDrawing {
-  TracedDrawing(const Network& network, const Tensor& inputs) : input(inputs), drawn(network.draw(input)) {}
+struct TracedPrediction {
+  TracedPrediction(const Network& network, const Tensor& inputs)
+      : input(inputs), drawn(network.draw(input)) {}
 
   NoGrad no_grad;
   Trace trace;
   Variable input;
-  Drawing drawn;
+  Prediction drawn;
 };
 
 }  // namespace supertac

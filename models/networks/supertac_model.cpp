@@ -137,7 +137,7 @@ Variable Upsampler::map_of(const Variable& latents, const Variable& windows) con
   return last_frame_ ? past + present : past;
 }
 
-Drawing Upsampler::forward(const Variable& latents, const Variable& windows) const {
+Prediction Upsampler::forward(const Variable& latents, const Variable& windows) const {
   Variable h = map_of(latents, windows);                // [N,rows,columns,channels]
   for (const Rirb& rirb : rirbs_) h = rirb.forward(h);  // twice as high and wide by each
   return {out_.forward(h), predicted_error_ ? predicted_error_->forward(h) : Variable(), latents};
@@ -182,7 +182,7 @@ SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor
     z[i] = sample_gaussian(out.latent[i].mean, out.latent[i].log_var, eps[i]);
     out.decoded[i] = decoders_[i].forward(z[i]);  // [N,LD] -> [N,T,group_signals]
   }
-  const Drawing drawn = upsampler_.forward(concat_groups(z.span()), Variable(windows));  // of [N,G LD]
+  const Prediction drawn = upsampler_.forward(concat_groups(z.span()), Variable(windows));  // of [N,G LD]
   out.picture = drawn.picture, out.predicted_error = drawn.predicted_error;  // [N,rows scale,columns scale,1]
   return out;
 }
@@ -206,6 +206,8 @@ Tensor SuperTac::encode(const Tensor& windows) const {
   return means(Variable(windows)).value();
 }
 
-Drawing SuperTac::draw(const Variable& windows) const { return upsampler_.forward(means(windows), windows); }
+Prediction SuperTac::draw(const Variable& windows) const {
+  return upsampler_.forward(means(windows), windows);
+}
 
 }  // namespace supertac

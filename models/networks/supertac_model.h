@@ -79,7 +79,7 @@ class Upsampler : public Module {
  public:
   Upsampler(const SuperTacSettings& settings, Rng& rng);
   /// `windows` [N,T,signals] as the network takes them; latents are undefined where there are none.
-  Drawing forward(const Variable& latents, const Variable& windows) const;
+  Prediction forward(const Variable& latents, const Variable& windows) const;
 
  private:
   Variable map_of(const Variable& latents, const Variable& windows) const;
@@ -107,7 +107,7 @@ class SuperTac : public Network {
   /// Throws std::invalid_argument on other shapes.
   Output forward(const Tensor& windows, std::span<const Tensor> eps) const;
   /// Evaluation: z = mean, no decoders.
-  Drawing draw(const Variable& windows) const override;
+  Prediction draw(const Variable& windows) const override;
   /// The latent means [N,G LD]. Throws std::invalid_argument for single frames, which have none.
   Tensor encode(const Tensor& windows) const;
 

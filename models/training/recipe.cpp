@@ -49,7 +49,7 @@ void Recipe::check() const {
   const PixelInterval interval = interval_factor.value_or(PixelInterval{});
   require(PixelInterval::read(interval.text()).has_value(), "interval_factor from 0.05 to 100",
           interval.factor);
-  if (range) require(std::abs(range->span_volts) > 1e-6, "a span that is not 0", range->span_volts);
+  if (range) require(std::abs(range->span) > 1e-6, "a span that is not 0", range->span);
   if (per_window && model.timesteps == 1)
     throw std::invalid_argument(
         "recipe: single frames (--timesteps 1) say nothing of their own rest and gain; give --scaling fixed, "

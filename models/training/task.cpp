@@ -15,17 +15,17 @@ namespace {
 Scaling scaling_of(const Recipe& recipe, const SignalRange& range, std::vector<std::string>& notes) {
   constexpr double kMostClipped = 0.5, kWorthSaying = 0.01;
   Scaling scaling = recipe.range ? *recipe.range : range.fitted();
-  const std::string text = format(scaling.rest_volts) + "," + format(scaling.span_volts);
+  const std::string text = format(scaling.rest) + "," + format(scaling.span);
   const double clipped = range.clipped(scaling);
   const std::string clips = "--range " + text + " clips " + format(100 * clipped, 1) +
                             " % of the signals, which lie at " + range.text();
   if (clipped > kMostClipped) throw std::runtime_error(clips + "; give REST,SPAN that hold them, or auto");
-  const double stated = range.stated().rest_volts;
-  if (clipped > kWorthSaying || scaling.rest_volts != stated) notes.push_back(clips);
-  if (recipe.random_plates > 0 && scaling.rest_volts != stated)
+  const double stated = range.stated().rest;
+  if (clipped > kWorthSaying || scaling.rest != stated) notes.push_back(clips);
+  if (recipe.random_plates > 0 && scaling.rest != stated)
     throw std::invalid_argument("--random-plates imitates a sensor whose signals rest at " + format(stated) +
                                 ", as the recordings state; those of these recordings rest at " +
-                                format(scaling.rest_volts) +
+                                format(scaling.rest) +
                                 "; record them with a sensor's file that states their range, or leave "
                                 "--random-plates out");
   scaling.per_window = recipe.per_window;

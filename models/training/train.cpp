@@ -7,9 +7,9 @@
 #include "data/windows/transforms/signal_features.h"
 #include "io/numbers/numbers.h"
 #include "layers/checkpoint.h"
+#include "models/inference/compiled/ranges.h"
 #include "models/inference/evaluation.h"
 #include "models/inference/novelty.h"
-#include "models/inference/prepared/ranges.h"
 
 namespace supertac {
 namespace {
@@ -19,7 +19,7 @@ constexpr std::int64_t kStepsPerLine = 50;
 
 void test(const Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop,
           LogLine& line) {
-  const Metrics contact = score(Ensemble({Prepared(trainer.model())}), *task.windows,
+  const Metrics contact = score(Ensemble({CompiledModel(trainer.model())}), *task.windows,
                                 evenly_spaced(task.split.test, kTestedPerEpoch), stop)
                               .contact();
   if (contact.windows == 0) return;
@@ -29,7 +29,7 @@ void test(const Trainer& trainer, const TrainingTask& task, const std::function<
 
 // What the networks of a training are chosen by.
 double score_of(const Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop) {
-  return score(Ensemble({Prepared(trainer.model())}), *task.windows,
+  return score(Ensemble({CompiledModel(trainer.model())}), *task.windows,
                evenly_spaced(task.held_out, kTestedPerEpoch), stop)
       .contact()
       .ssim;
@@ -57,7 +57,7 @@ std::vector<StoredTensor> novelty_of(const Trainer& trainer) {
 StoredTensor ranges_of(const Trainer& trainer) {
   constexpr std::size_t kSamples = 1024;
   ActivationRanges ranges;
-  for_each_output(Ensemble({Prepared(trainer.model())}), trainer.windows(),
+  for_each_output(Ensemble({CompiledModel(trainer.model())}), trainer.windows(),
                   evenly_spaced(trainer.training_side(), kSamples), [&](const EvaluatedBatch& b) {
                     ranges.add(trainer.model(), b.inputs);
                     return true;
@@ -117,12 +117,13 @@ std::map<std::string, std::string> trained_origin(const Trainer& trainer, const 
   if (!task.finds_interval_factor) return origin;
   const std::vector<std::uint32_t> tested = evenly_spaced(task.split.test, kTestedPerEpoch);
   IntervalCoverage coverage;
-  for_each_output(Ensemble({Prepared(trainer.model())}), *task.windows, tested, [&](const EvaluatedBatch& b) {
-    for (std::size_t n = 0; n < b.size() && !b.predicted_errors.empty(); ++n)
-      coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n), task.windows->image().width,
-                   b.target(n), b.predicted_error(n));
-    return true;
-  });
+  for_each_output(Ensemble({CompiledModel(trainer.model())}), *task.windows, tested,
+                  [&](const EvaluatedBatch& b) {
+                    for (std::size_t n = 0; n < b.size() && !b.predicted_errors.empty(); ++n)
+                      coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n),
+                                   task.windows->image().width, b.target(n), b.predicted_error(n));
+                    return true;
+                  });
   if (coverage.empty()) return origin;
   origin["interval_factor"] = coverage.found().text();
   origin["interval_factor_found"] = "tested groups";

@@ -28,8 +28,8 @@ inline Recording make_recording(const PassPlan& plan) {
     const double t = static_cast<double>(i) / plan.rate_hz;
     recording.time_s.push_back(t);
     for (int k = 0; k < kTaxels; ++k)
-      recording.volts.push_back(plan.level + 0.001F * static_cast<float>(i) +
-                                0.0001F * static_cast<float>(k));
+      recording.signals.push_back(plan.level + 0.001F * static_cast<float>(i) +
+                                  0.0001F * static_cast<float>(k));
     recording.position_mm.push_back(18.0F);
     recording.position_mm.push_back(static_cast<float>(plan.start_y_mm + plan.speed_mm_s * t));
   }
@@ -40,7 +40,7 @@ inline Recording make_recording(const PassPlan& plan) {
 inline WindowSettings wide_settings(int timesteps = 16) {
   WindowSettings settings;
   settings.timesteps = timesteps;
-  settings.scaling = {.rest_volts = 3.0, .span_volts = 2.0};
+  settings.scaling = {.rest = 3.0, .span = 2.0};
   return settings;
 }
 

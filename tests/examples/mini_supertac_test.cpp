@@ -78,7 +78,7 @@ TEST(MiniSuperTac, HasTheProjectsLossesAndPicture) {
   for (Array& eps : unseen[0].eps) eps.assign(kLatent, 0);
   const Drawn mine = ::draw(unseen[0]);
   const NoGrad no_grad;
-  const Drawing theirs = model.draw(Variable(windows_of(unseen)));
+  const Prediction theirs = model.draw(Variable(windows_of(unseen)));
   for (std::size_t i = 0; i < 256; ++i) {
     ASSERT_NEAR(mine.picture->value[i], static_cast<double>(theirs.picture.value().data()[i]), kTolerance)
         << i;

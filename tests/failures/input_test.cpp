@@ -25,7 +25,7 @@ Recording recording(F spoil, int trial = 1, std::size_t frames = 150) {
     r.time_s.push_back(t);
     r.position_mm.insert(r.position_mm.end(), {18, static_cast<float>(36 + 10 * t)});
     for (int k = 0; k < kTaxels; ++k) {
-      r.volts.push_back(static_cast<float>(2.3 + (0.1 + 0.01 * trial) * std::sin(20 * t + 0.3 * k)));
+      r.signals.push_back(static_cast<float>(2.3 + (0.1 + 0.01 * trial) * std::sin(20 * t + 0.3 * k)));
     }
   }
   spoil(r);
@@ -52,7 +52,7 @@ bool all_in_range(const WindowSet& windows) {
 }
 
 TEST(Failures, F11ANanInARecordingIsDroppedAndCounted) {
-  const Recording spoilt = recording([](Recording& r) { r.volts[50 * kTaxels + 3] = kNan; });
+  const Recording spoilt = recording([](Recording& r) { r.signals[50 * kTaxels + 3] = kNan; });
   const WindowSet windows = windows_of({spoilt});
   EXPECT_EQ(windows.counts().damaged, 1U);
   EXPECT_TRUE(all_in_range(windows));
@@ -71,16 +71,16 @@ TEST(Failures, F11ANanInAWindowReachesEveryPixel) {
 
 TEST(Failures, F11VoltagesAThousandTimesTooLargeAreClipped) {
   const WindowSet windows = windows_of({recording([](Recording& r) {
-    for (float& v : r.volts) v *= 1000;
+    for (float& v : r.signals) v *= 1000;
   })});
   EXPECT_TRUE(all_in_range(windows));
 }
 
 TEST(Failures, F11ConstantClippedAndDeadSignalsTrainToFiniteNumbers) {
-  const auto constant = [](Recording& r) { std::fill(r.volts.begin(), r.volts.end(), 2.4F); };
-  const auto clipped = [](Recording& r) { std::fill(r.volts.begin(), r.volts.end(), 0.0F); };
+  const auto constant = [](Recording& r) { std::fill(r.signals.begin(), r.signals.end(), 2.4F); };
+  const auto clipped = [](Recording& r) { std::fill(r.signals.begin(), r.signals.end(), 0.0F); };
   const auto dead_taxel = [](Recording& r) {
-    for (std::size_t i = 5; i < r.volts.size(); i += kTaxels) r.volts[i] = 2.46F;
+    for (std::size_t i = 5; i < r.signals.size(); i += kTaxels) r.signals[i] = 2.46F;
   };
   const WindowSet windows =
       windows_of({recording(constant), recording(clipped, 2), recording(dead_taxel, 3)});

@@ -34,7 +34,7 @@ inline void check_one_journal(std::span<const std::byte> input) {
     const Collection collection = collection_of(journal);
     for (const CollectedPass& pass : collection.passes) {
       const std::size_t frames = pass.time_s.size();
-      if (pass.volts.size() != collection.sensor.array.signals() * frames ||
+      if (pass.signals.size() != collection.sensor.array.signals() * frames ||
           pass.position.size() != 3 * frames || pass.suspect.size() != frames) {
         throw std::logic_error("collection: a pass whose columns differ in length");
       }

@@ -78,7 +78,7 @@ std::string check_frames(const Journal& journal, const NumberedBoard& board, con
 double true_speed(const CollectedPass& pass, const NumberedBoard& board, const PalpationPlan& plan) {
   std::optional<std::uint64_t> first, last;
   for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
-    const auto numbers = board.numbers_in(pass.volts, i);
+    const auto numbers = board.numbers_in(pass.signals, i);
     const double y = pass.position[3 * i + 1] - plan.start.y;
     if (numbers.size() != 1 || y < 0.2 * plan.slide || y > 0.8 * plan.slide) continue;
     if (!first) first = numbers[0];
@@ -112,7 +112,7 @@ void judge_passes(const Collection& collection, const NumberedBoard& board, cons
     double worst = 0;
     for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
       const double* p = pass.position.data() + 3 * i;
-      const auto numbers = board.numbers_in(pass.volts, i);
+      const auto numbers = board.numbers_in(pass.signals, i);
       for (const std::uint64_t number : numbers)
         worst = std::max(worst, distance(board.head(number), {p[0], p[1], p[2]}));
       verdict.compared += numbers.empty() ? 0 : 1;

@@ -16,7 +16,7 @@
 #include "io/files/provenance.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
-#include "models/inference/prepared/prepared.h"
+#include "models/inference/compiled/compiled_model.h"
 #include "models/training/train.h"
 #include "tests/data/test_recordings.h"
 #include "tests/expect_error.h"
@@ -56,7 +56,8 @@ class Library : public testing::Test {
     return drawn_of(inputs, precision);
   }
   Estimate drawn_of(const Tensor& inputs, int precision) const {
-    return (precision == SUPERTAC_INT8 ? Prepared(*file_.model, *file_.ranges) : Prepared(*file_.model))
+    return (precision == SUPERTAC_INT8 ? CompiledModel(*file_.model, *file_.ranges)
+                                       : CompiledModel(*file_.model))
         .estimate(inputs);
   }
 

@@ -87,7 +87,7 @@ inline WindowSet small_windows(const SuperTacSettings& model, std::size_t frames
       r.position_mm.insert(r.position_mm.end(), {18, static_cast<float>(y)});
       for (int k = 0; k < kTaxels; ++k) {
         const double height = plate.height(18, y - 4.5 + 3 * (k / 4));
-        r.volts.push_back(static_cast<float>(2.44 - 0.1 * height - 0.002 * ((trial + k) % 3)));
+        r.signals.push_back(static_cast<float>(2.44 - 0.1 * height - 0.002 * ((trial + k) % 3)));
       }
     }
     if (spoil) spoil(r);

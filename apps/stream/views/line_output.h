@@ -7,16 +7,16 @@
 #include <string>
 #include <thread>
 
-#include "apps/stream/seen.h"
+#include "apps/stream/live_frame.h"
 #include "data/sensors/frame_load.h"
 
 namespace supertac {
 
 /// {"timestamp":s,"wall_s":s,"number":n,ABOUT,"total_force":f,"saturated":n,"volts":[...],"picture":[...]}
-/// with the numbers of Seen and its load, four decimals of what is felt and drawn, and a line feed; without a
-/// model no "picture"; of one that says how sure it is also "half_width", the mean over the pixels,
+/// with the numbers of LiveFrame and its load, four decimals of what is felt and drawn, and a line feed;
+/// without a model no "picture"; of one that says how sure it is also "half_width", the mean over the pixels,
 /// "distance" and "unlike_training", 0 or 1. "wall_s" only where it is known.
-std::string picture_line(const Seen& seen, const FrameLoad& load, bool unlike_training,
+std::string picture_line(const LiveFrame& seen, const FrameLoad& load, bool unlike_training,
                          const std::string& about);
 /// What all lines of a stream have in common:
 /// "height":16,"width":16,"pixel_mm":0.75,"rows":4,"columns":4,"channels":1,"pitch_mm":3,"unit":"V".

@@ -1,5 +1,5 @@
-// Jobs of the kernels that prepared networks run (models/inference/prepared/prepared.h). Maps have margins of
-// zeros, so that no tap needs to know where the border is, and weights lie as the loops read them.
+// Jobs of the kernels that compiled models run (models/inference/compiled/compiled_model.h). Maps have
+// margins of zeros, so that no tap needs to know where the border is, and weights lie as the loops read them.
 #pragma once
 
 #include "autograd/tensor.h"

@@ -13,9 +13,9 @@ namespace {
 std::vector<double> loads_of(const Recording& recording) {
   std::vector<double> loads(recording.frames());
   const std::size_t signals = recording.array.signals();
-  for (std::size_t i = 0; i < recording.volts.size(); ++i)
+  for (std::size_t i = 0; i < recording.signals.size(); ++i)
     loads[i / signals] +=
-        (recording.signal_scale.rest - double{recording.volts[i]}) / recording.signal_scale.span;
+        (recording.signal_scale.rest - double{recording.signals[i]}) / recording.signal_scale.span;
   return loads;
 }
 
@@ -58,7 +58,7 @@ void show(const Recording& film, const FilmClock& clock, Recording& recording) {
       recording.truth.push_back(
           std::lerp(film.truth[k * pixels + p], film.truth[(k + 1) * pixels + p], share));
   }
-  keep_only(recording.volts, recording.array.signals(), seen);
+  keep_only(recording.signals, recording.array.signals(), seen);
   keep_only(recording.position_mm, 2, seen);
   keep_only(recording.lift_mm, 1, seen);
   keep_only(recording.time_s, 1, seen);

@@ -140,7 +140,7 @@ std::vector<Recording> import_pairs(const SafetensorsFile& file, const std::opti
     for (const std::size_t i : frames) {
       recording.time_s.push_back(static_cast<double>(recording.time_s.size()));
       for (std::size_t s = 0; s < taxels * channels; ++s)  // channels come last in recordings
-        recording.volts.push_back(inputs[(i * channels + s % channels) * taxels + s / channels]);
+        recording.signals.push_back(inputs[(i * channels + s % channels) * taxels + s / channels]);
       const auto truth = std::span(targets).subspan(i * pixels, pixels);
       recording.truth.insert(recording.truth.end(), truth.begin(), truth.end());
     }

@@ -255,13 +255,13 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
   for (std::size_t k = 0; k < columns.values.size(); ++k)
     if (!silent[k]) check_taxel(path, table, columns.values[k], k, sensor.scale);
   const std::size_t signals = sensor.array.signals();
-  recording.volts.resize(table.rows() * signals);
+  recording.signals.resize(table.rows() * signals);
   std::vector<float> sent(sensor.values());
   RestTracker rest(sensor);
   for (std::size_t i = 0; i < table.rows(); ++i) {
     for (std::size_t k = 0; k < sent.size(); ++k)
       sent[k] = static_cast<float>(table.row(i)[columns.values[k]]);
-    const auto frame = std::span(recording.volts).subspan(i * signals, signals);
+    const auto frame = std::span(recording.signals).subspan(i * signals, signals);
     sensor.arrange(sent, frame);
     rest.follow(recording.time_s[i], frame);
     if (columns.x == Columns::kNone) continue;

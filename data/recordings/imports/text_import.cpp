@@ -79,7 +79,7 @@ Recording import_text_pass(const std::string& path, ImportReport& report) {
     ++(report.*kind);
     if (kind != &ImportReport::frames) continue;
     recording.time_s.push_back(static_cast<double>(report.lines - report.empty - 1) / rig::kFrameRateHz);
-    recording.volts.insert(recording.volts.end(), volts.begin(), volts.end());
+    recording.signals.insert(recording.signals.end(), volts.begin(), volts.end());
   }
   refuse_other_files(path, report);
   return recording;

@@ -90,7 +90,7 @@ void measure(const Recording& r, Sensor& sensor) {
   const std::size_t signals = sensor.array.signals();
   std::vector<double> noises;
   std::vector<std::vector<float>> all(signals);
-  for (std::size_t i = 0; i < r.volts.size(); ++i) all[i % signals].push_back(r.volts[i]);
+  for (std::size_t i = 0; i < r.signals.size(); ++i) all[i % signals].push_back(r.signals[i]);
   const std::vector<double> levels = rests_between_touches(all, sensor.array.channels, sensor.scale.span < 0);
   const std::vector<float> before = rests_before(r, sensor);
   std::vector<float> rest;

@@ -103,14 +103,14 @@ class Press {
     while (!response_.neutral() && before_ + kStepS < t) show(before_ + kStepS);
     std::vector<double> shares = show(t);
     const auto channels = static_cast<std::size_t>(sensor_.array.channels);
-    const std::size_t from = recording.volts.size();
+    const std::size_t from = recording.signals.size();
     for (std::size_t s = 0; s < shares.size(); ++s) {
       const double lean_rest = channels == 3 && s % 3 < 2 && sensor_.rest.empty() ? 0.5 : 0;
       const double noisy = shares[s] + lean_rest + body_.noise * random_.normal(kSamples + samples_++);
-      recording.volts.push_back(static_cast<float>(
+      recording.signals.push_back(static_cast<float>(
           sensor_.scale.rest - sensor_.scale.span * std::clamp(noisy, -4 * body_.noise, 1.0)));
     }
-    sensor_.fill_silent(std::span(recording.volts).subspan(from));
+    sensor_.fill_silent(std::span(recording.signals).subspan(from));
     if (scale == 0) return;
     const int rows = sensor_.array.rows * scale, columns = sensor_.array.columns * scale;
     const int above = (field_.rows - rows) / 2, beside = (field_.columns - columns) / 2;

@@ -35,7 +35,7 @@ struct Loads {
     for (std::size_t k = 0; k < taxels; ++k) {
       std::vector<double> own;
       for (std::size_t f = 0; f < frames; ++f)
-        own.push_back((r.signal_scale.rest - double{r.volts[(f * taxels + k) * channels + channels - 1]}) /
+        own.push_back((r.signal_scale.rest - double{r.signals[(f * taxels + k) * channels + channels - 1]}) /
                       r.signal_scale.span);
       const double rest = quantile(own, 0.3);
       for (std::size_t f = 0; f < frames; ++f) share[f * taxels + k] = own[f] - rest;

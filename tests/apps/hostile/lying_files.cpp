@@ -160,7 +160,7 @@ void use_recording(const std::string& path) {
 
 void use_model(const std::string& path) {
   const ModelFile file = load_model(path);
-  (void)Prepared(*file.model).estimate(Tensor::full(file.model->input_shape(1), 0.5F));
+  (void)CompiledModel(*file.model).estimate(Tensor::full(file.model->input_shape(1), 0.5F));
 }
 
 void use_pairs(const std::string& path) {

@@ -113,10 +113,10 @@ TEST_F(Array, ThreeChannelsOfTwoBySix) {
   simulate(2, 6, "2.5");
   for (const std::string& file : list_recordings(path("data"))) {
     Recording recording = read_recording(file);
-    const std::vector<float> one = recording.volts;
+    const std::vector<float> one = recording.signals;
     recording.array.channels = 3;
-    recording.volts.clear();
-    for (const float v : one) recording.volts.insert(recording.volts.end(), {v, 0.5F * v + 1.2F, 2.4F});
+    recording.signals.clear();
+    for (const float v : one) recording.signals.insert(recording.signals.end(), {v, 0.5F * v + 1.2F, 2.4F});
     write_recording(file, recording);
   }
   train("data");
@@ -131,7 +131,7 @@ TEST_F(Array, SignalsOfAnotherRangeAreNoticed) {
   simulate(3, 5, "2.5");
   for (const std::string& file : list_recordings(path("data"))) {
     Recording recording = read_recording(file);
-    for (float& v : recording.volts) v = 100 - (2.45F - v) / 0.36F * 35;
+    for (float& v : recording.signals) v = 100 - (2.45F - v) / 0.36F * 35;
     write_recording(file, recording);
   }
   const std::string brief =
@@ -141,8 +141,8 @@ TEST_F(Array, SignalsOfAnotherRangeAreNoticed) {
   expect_exit(run(brief + "--random-plates 5"), 1, "--random-plates imitates a sensor whose signals rest at");
   succeed(brief);
   const ModelFile file = load_model(path("m.safetensors"));
-  EXPECT_NEAR(file.input.scaling.rest_volts, 100, 3);
-  EXPECT_NEAR(file.input.scaling.span_volts, 30, 15);
+  EXPECT_NEAR(file.input.scaling.rest, 100, 3);
+  EXPECT_NEAR(file.input.scaling.span, 30, 15);
 }
 
 TEST_F(Array, WindowsOf64RowsAreTrainedAndKept) {
@@ -163,7 +163,7 @@ TEST_F(Array, IsSimulatedAsASensorsFileSays) {
   EXPECT_EQ(recording.array, (TaxelArray{.rows = 4, .columns = 6, .pitch_mm = {4, 2.5}}));
   EXPECT_EQ(recording.signal_scale, (SignalScale{.unit = "counts", .rest = 40, .span = -860}));
   EXPECT_NEAR(recording.time_s[1] - recording.time_s[0], 0.01, 1e-9);
-  const auto [low, high] = std::ranges::minmax(recording.volts);
+  const auto [low, high] = std::ranges::minmax(recording.signals);
   EXPECT_GT(low, 0);
   EXPECT_GT(high, 300);
   EXPECT_LT(high, 910);
@@ -187,7 +187,7 @@ TEST_F(Array, AHundredTablesAreImportedTrainedAndScored) {
       for (std::size_t i = part * r.frames() / 20; i < (part + 1) * r.frames() / 20; ++i) {
         text += format(1e3 * r.time_s[i]) + ";" + format(r.position_mm[2 * i]) + ";" +
                 format(r.position_mm[2 * i + 1]);
-        for (std::size_t k = 0; k < 16; ++k) text += ";" + format(r.volts[16 * i + k]);
+        for (std::size_t k = 0; k < 16; ++k) text += ";" + format(r.signals[16 * i + k]);
         text += "\n";
       }
       write_file(day + "/" + std::to_string(r.pass) + "_" + std::to_string(part) + ".csv", text);
@@ -227,7 +227,7 @@ TEST_F(Array, ATableWithoutPositionsIsRegisteredAgainstItsPlate) {
   const Recording truth = read_recording(list_recordings(path("sim")).front());
   std::string text;
   for (std::size_t i = 0; i < truth.frames(); ++i)
-    for (std::size_t k = 0; k < 36; ++k) text += format(truth.volts[36 * i + k]) + (k < 35 ? " " : "\n");
+    for (std::size_t k = 0; k < 36; ++k) text += format(truth.signals[36 * i + k]) + (k < 35 ? " " : "\n");
   write_file(path("slide.txt"), text);
   const std::string import = "supertac-import --sensor mat.json --speed 12 ";
   EXPECT_TRUE(

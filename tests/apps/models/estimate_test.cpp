@@ -49,8 +49,8 @@ TEST_F(Estimate, OfGradientChecks) {
 TEST_F(Estimate, OfAnImport) {
   const Recording pass = read_recording(list_recordings(path("data")).front());
   std::string text;
-  for (std::size_t i = 0; i < pass.volts.size(); ++i)
-    text += std::to_string(pass.volts[i]) + (i % 16 == 15 ? '\n' : ' ');
+  for (std::size_t i = 0; i < pass.signals.size(); ++i)
+    text += std::to_string(pass.signals[i]) + (i % 16 == 15 ? '\n' : ' ');
   const std::string plate = path("text/3_Bumps");
   for (int k = 1; k <= 1000; ++k) std::filesystem::create_directories(plate + "/" + std::to_string(k));
   write_file(plate + "/1/1.txt", text);

@@ -67,8 +67,8 @@ class RoundTrips : public Training {
   static void import_texts() {
     const Recording pass = read_recording(path("data/3_Bumps_t1_p1_v10.safetensors"));
     std::string text;
-    for (std::size_t i = 0; i < pass.volts.size(); ++i)
-      text += std::to_string(pass.volts[i]) + (i % 16 == 15 ? '\n' : ' ');
+    for (std::size_t i = 0; i < pass.signals.size(); ++i)
+      text += std::to_string(pass.signals[i]) + (i % 16 == 15 ? '\n' : ' ');
     fs::create_directories(path("text/3_Bumps/1"));
     write_file(path("text/3_Bumps/1/1.txt"), text);
     succeed("supertac-import text --out imported");

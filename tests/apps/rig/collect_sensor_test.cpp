@@ -90,7 +90,7 @@ class CollectSensor : public testing::Test {
       const float* p = &recording.position_mm[2 * i];
       const auto expected = counts({double{p[0]}, double{p[1]} + off_mm, double{recording.lift_mm[i]}});
       for (std::size_t s = 0; s < expected.size(); ++s, ++count)
-        sum += std::abs(expected[s] - double{recording.volts[64 * i + s]});
+        sum += std::abs(expected[s] - double{recording.signals[64 * i + s]});
     }
     return sum / count;
   }
@@ -101,7 +101,7 @@ class CollectSensor : public testing::Test {
       if (apart(recording, off_mm) < apart(recording, best_mm)) best_mm = off_mm;
     EXPECT_NEAR(best_mm, 0, 0.35);
     EXPECT_LT(apart(recording, 0), 0.5 * apart(recording, 1.5)) << "shifted it would fit as well";
-    EXPECT_GT(std::ranges::max(recording.volts), 200) << "it felt the plate";
+    EXPECT_GT(std::ranges::max(recording.signals), 200) << "it felt the plate";
     RecordProperty("best_mm", std::to_string(best_mm));
   }
 

@@ -65,7 +65,7 @@ TEST(CollectProgram, StoppedForAWhileItIsRightOrSaysSo) {
       run.rig().with_world([&](RigWorld&) {  // which goes on
         for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
           const double* p = &pass.position[3 * i];
-          for (const std::uint64_t n : numbers.numbers_in(pass.volts, i))
+          for (const std::uint64_t n : numbers.numbers_in(pass.signals, i))
             worst = std::max(worst, distance(numbers.head(n), {p[0], p[1], p[2]}));
         }
       });

@@ -51,7 +51,7 @@ TEST_F(RigTest, CollectShowsALiveLineAndReportsEveryPass) {
   EXPECT_EQ(pass["frames"], recording.frames());
   EXPECT_EQ(recording.plate, "my.stl");
   // At first the finger is in the air: at rest, however long this machine has been running.
-  for (std::size_t k = 0; k < kTaxels; ++k) EXPECT_NEAR(recording.volts[k], 2.44, 0.05) << "taxel " << k;
+  for (std::size_t k = 0; k < kTaxels; ++k) EXPECT_NEAR(recording.signals[k], 2.44, 0.05) << "taxel " << k;
   // The folder holds its plate: truths can be drawn wherever it is moved.
   std::filesystem::rename(path("out"), path("moved"));
   std::filesystem::remove(path("my.stl"));

@@ -28,7 +28,7 @@ TEST(RawArray, SaysWhichSignalIsFarthestFromItsRest) {
   Recording recording;
   recording.time_s = {0, 0.01}, recording.array = {.rows = 2, .columns = 2, .channels = 2};
   recording.signal_scale = {.unit = "counts", .rest = 100, .span = -400};
-  recording.volts.assign(16, 100), recording.plate = "unknown", recording.trial = recording.pass = 1;
+  recording.signals.assign(16, 100), recording.plate = "unknown", recording.trial = recording.pass = 1;
   write_recording(folder / "r.safetensors", recording);
   const auto source = open_recording(folder / "r.safetensors");
   RawArray raw(*source);

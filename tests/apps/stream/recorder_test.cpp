@@ -25,9 +25,9 @@ using RecorderTest = InFolder;
 
 const PictureFormat kFormat{.signals = 2, .image = {2, 2, 1}, .half_widths = true, .distance = true};
 
-Seen seen_at(double time_s) {
+LiveFrame seen_at(double time_s) {
   static const std::vector<float> volts = {1, 2}, picture = {3, 4, 5, 6}, half = {7, 8, 9, 10};
-  return {.time_s = time_s, .volts = volts, .picture = picture, .half_widths = half, .distance = 11.0};
+  return {.time_s = time_s, .signals = volts, .picture = picture, .half_widths = half, .distance = 11.0};
 }
 
 TEST_F(RecorderTest, KeepsWhatCameBetweenStartAndStop) {

@@ -151,7 +151,7 @@ void expect_sent(const Recording& recording, const FakeDevice& device, const Sen
   const std::size_t signals = arranged.array.signals();
   int before = -1;
   for (std::size_t i = 0; i < recording.frames(); ++i) {
-    const auto first = recording.volts.begin() + static_cast<std::ptrdiff_t>(i * signals);
+    const auto first = recording.signals.begin() + static_cast<std::ptrdiff_t>(i * signals);
     const auto found = sent.find({first, first + static_cast<std::ptrdiff_t>(signals)});
     ASSERT_NE(found, sent.end()) << "frame " << i << " was never sent";
     const auto next = found->second.upper_bound(before);
@@ -287,7 +287,7 @@ TEST_F(SensorFiles, ARestThatDriftsIsFollowedWhereTheFileAsks) {
   const std::size_t signals = sensor.array.signals(), last = recording.frames() - 1;
   ASSERT_GT(recording.frames(), static_cast<std::size_t>(frames) * 9 / 10);
   const auto share = [&](std::size_t frame, std::size_t k) {
-    return (sensor.scale.rest - double{recording.volts[frame * signals + k]}) / sensor.scale.span;
+    return (sensor.scale.rest - double{recording.signals[frame * signals + k]}) / sensor.scale.span;
   };
   EXPECT_NEAR(share(last / 2, 0), 0, 0.01);
   EXPECT_NEAR(share(last, 0), 0, 0.02);
@@ -342,7 +342,7 @@ TEST_F(SensorFiles, FromSimulatedPassesToLivePictures) {
       std::vector<double> values(16);
       for (std::size_t k = 0; k < 16; ++k) {
         const std::size_t place = sensor.order.empty() ? k : static_cast<std::size_t>(sensor.order[k]);
-        values[place] = SignalScale{}.in(sensor.scale, double{pass.volts[i * 16 + k]});
+        values[place] = SignalScale{}.in(sensor.scale, double{pass.signals[i * 16 + k]});
       }
       bytes += sent_frame(sensor, values, 0.01 * static_cast<double>(i));
     }

@@ -84,7 +84,7 @@ TEST_F(Streaming, StoppedForAWhileItRecordsWhatItCanDate) {
     const Recording recording = read_recording(result("json").at("recording"));
     std::vector<double> off_s;  // from the board's own time, as far as the clocks' zeros are apart
     for (std::size_t i = 0; i < recording.frames(); ++i)
-      for (const std::uint64_t n : numbers.numbers_in(recording.volts, i))
+      for (const std::uint64_t n : numbers.numbers_in(recording.signals, i))
         off_s.push_back(recording.time_s[i] - static_cast<double>(n) * rig::kFramePeriodS);
     ASSERT_GT(off_s.size(), 1000U);
     const auto [least, most] = std::ranges::minmax(off_s);

@@ -67,7 +67,7 @@ TEST_F(Streaming, ARecordingGivesThePicturesOfItsWindows) {
     while (at < times.size() && times[at] < time - 1e-9) ++at;
     if (at == times.size() || times[at] > time + 1e-9) continue;  // a lost frame has no picture
     windows.window(i, window.values());
-    const Tensor picture = Prepared(*file.model).estimate(window).picture;
+    const Tensor picture = CompiledModel(*file.model).estimate(window).picture;
     ASSERT_TRUE(std::equal(picture.data(), picture.data() + 64, &pictures[at * 64])) << "window " << i;
     ++compared;
   }
@@ -189,7 +189,7 @@ TEST_F(Streaming, WrongUsageIsExitCode2) {
 TEST_F(Streaming, TooShortASignalSaysHowMuchIsNeeded) {
   Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = 32});
   recording.metadata.erase("filter_s");
-  recording.time_s.resize(20), recording.volts.resize(20 * kTaxels), recording.position_mm.resize(40);
+  recording.time_s.resize(20), recording.signals.resize(20 * kTaxels), recording.position_mm.resize(40);
   recording.lift_mm.clear();
   write_recording(path("recording"), recording);
   expect_failure(stream("--recording recording"), 1, "no picture, expected 0.11 s of signal");
@@ -217,7 +217,7 @@ TEST_F(Streaming, ADiskThatBecomesFullEndsTheRecordingAndKeepsIt) {
   const Recording all = read_recording(path("recording")), kept = read_recording(path("kept"));
   ASSERT_LT(kept.frames(), all.frames());
   EXPECT_TRUE(contains(result.error, "the " + std::to_string(kept.frames()) + " frames until here are kept"));
-  EXPECT_TRUE(std::equal(kept.volts.begin(), kept.volts.end(), all.volts.begin()));
+  EXPECT_TRUE(std::equal(kept.signals.begin(), kept.signals.end(), all.signals.begin()));
 }
 
 TEST_F(Streaming, NothingIsOverwrittenWithoutForce) {

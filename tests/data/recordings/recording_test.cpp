@@ -27,7 +27,7 @@ TEST(Recording, RoundTripKeepsEverything) {
   write_recording(folder.file("a.safetensors"), written);
   const Recording read = read_recording(folder.file("a.safetensors"));
   EXPECT_EQ(read.time_s, written.time_s);
-  EXPECT_EQ(read.volts, written.volts);
+  EXPECT_EQ(read.signals, written.signals);
   ASSERT_EQ(read.position_mm.size(), written.position_mm.size());
   EXPECT_TRUE(std::isnan(read.position_mm[3]));
   EXPECT_EQ(read.position_mm[4], written.position_mm[4]);
@@ -49,13 +49,13 @@ TEST(Recording, CarriesItsArrayAndUnitUnlessTheyAreTheRigs) {
     EXPECT_FALSE(SafetensorsFile::read(folder.file("rig")).metadata().contains(key)) << key;
   Recording written = example();
   written.array = {.rows = 2, .columns = 3, .pitch_mm = {2.5, 4}, .channels = 3};
-  written.volts.resize(written.frames() * 18);
+  written.signals.resize(written.frames() * 18);
   written.signal_scale = {.unit = "counts", .rest = 1000, .span = -16'000'000};
   write_recording(folder.file("other"), written);
   const Recording read = read_recording(folder.file("other"));
   EXPECT_EQ(read.array, written.array);
   EXPECT_EQ(read.signal_scale, written.signal_scale);
-  EXPECT_EQ(read.volts, written.volts);
+  EXPECT_EQ(read.signals, written.signals);
   EXPECT_EQ(read.metadata, written.metadata);
   EXPECT_EQ(read.array.text(), "2x3 taxels at 2.5 x 4 mm with 3 channels");
 }
@@ -66,15 +66,15 @@ struct Parts {
                                                  {"trial", "1"},        {"pass", "1"},
                                                  {"speed_mm_s", "10"},  {"source", "imported"}};
   std::vector<double> time_s = {0, 0.1};
-  std::vector<float> volts = std::vector<float>(32, 2.4F);
-  std::vector<std::uint64_t> volts_shape = {2, 16};
+  std::vector<float> signals = std::vector<float>(32, 2.4F);
+  std::vector<std::uint64_t> signals_shape = {2, 16};
 };
 
 std::string message_of_parts(const Parts& parts) {
   TemporaryFolder folder;
   write_safetensors(folder.file("a"), parts.metadata,
                     {{"time_s", "F64", {parts.time_s.size()}, std::as_bytes(std::span(parts.time_s))},
-                     {"volts", "F32", parts.volts_shape, std::as_bytes(std::span(parts.volts))}});
+                     {"volts", "F32", parts.signals_shape, std::as_bytes(std::span(parts.signals))}});
   const std::string message = what_of<FileError>([&] { read_recording(folder.file("a")); });
   const std::size_t path = folder.file("a: ").size();  // every message begins with it
   return message.starts_with(folder.file("a: ")) ? message.substr(path) : message;
@@ -91,13 +91,13 @@ TEST(Recording, ATensorIsNamedForWhatItHolds) {
   const SafetensorsFile file = SafetensorsFile::read(folder.file("counts"));
   EXPECT_TRUE(file.tensors().contains("signals"));
   EXPECT_FALSE(file.tensors().contains("volts"));
-  EXPECT_EQ(recording_of(file).volts, written.volts);
+  EXPECT_EQ(recording_of(file).signals, written.signals);
   Parts old;
   old.metadata["signals"] = R"({"unit":"counts","pressed":"higher","range":[0,900]})";
   write_safetensors(folder.file("old"), old.metadata,
                     {{"time_s", "F64", {2}, std::as_bytes(std::span(old.time_s))},
-                     {"volts", "F32", {2, 16}, std::as_bytes(std::span(old.volts))}});
-  EXPECT_EQ(read_recording(folder.file("old")).volts, old.volts);
+                     {"volts", "F32", {2, 16}, std::as_bytes(std::span(old.signals))}});
+  EXPECT_EQ(read_recording(folder.file("old")).signals, old.signals);
 }
 
 TEST(Recording, RefusesAnArrayThatIsNone) {
@@ -108,7 +108,7 @@ TEST(Recording, RefusesAnArrayThatIsNone) {
                "is a member of the recording");
   recording = example();
   recording.array.rows = 65;
-  recording.volts.resize(recording.frames() * 17 * 4);
+  recording.signals.resize(recording.frames() * 17 * 4);
   EXPECT_EQ(what_of<std::invalid_argument>([&] { write_recording(folder.file("a"), recording); }),
             "write_recording: signals has 476 values, expected 1820 for 7 frames");
   constexpr std::pair<const char*, const char*> kArrays[] = {
@@ -137,11 +137,11 @@ TEST(Recording, FileNameTellsWhatItIs) {
 TEST(Recording, WritesNoneThatBreaksARule) {
   TemporaryFolder folder;
   const std::pair<void (*)(Recording&), const char*> cases[] = {
-      {[](Recording& r) { r.volts.pop_back(); }, "signals has 111 values, expected 112 for 7 frames"},
+      {[](Recording& r) { r.signals.pop_back(); }, "signals has 111 values, expected 112 for 7 frames"},
       {[](Recording& r) { r.position_mm.pop_back(); }, "position_mm has 13 values, expected 14 for 7 frames"},
       {[](Recording& r) { r.time_s[3] = r.time_s[2]; }, "time_s does not increase at frame 3"},
       {[](Recording& r) { r.time_s[3] = std::nan(""); }, "time_s is not finite at frame 3"},
-      {[](Recording& r) { r.volts[17] = INFINITY; }, "signals are not finite at frame 1, taxel 1"},
+      {[](Recording& r) { r.signals[17] = INFINITY; }, "signals are not finite at frame 1, taxel 1"},
       {[](Recording& r) { r.trial = -1; }, "trial and pass must not be negative"},
       {[](Recording& r) { r.metadata["plate"] = "x"; },
        "the metadata field 'plate' is a member of the recording; set it there"}};
@@ -181,14 +181,14 @@ TEST(Recording, ReadsNoneThatBreaksARule) {
        "time_s lies beyond 1e+10 s; record or import it again"},
       {[](Parts& p) { p.metadata.erase("plate"); }, "is not a recording: the metadata lacks 'plate'"},
       {[](Parts& p) {
-         p.volts_shape = {16, 2};
+         p.signals_shape = {16, 2};
        },
        "tensor 'volts' has shape [16,2], expected [2,16]"},
       {[](Parts& p) {
          p.time_s = {0.1, 0.1};
        },
        "time_s does not increase at frame 1; record or import it again"},
-      {[](Parts& p) { p.volts[20] = NAN; },
+      {[](Parts& p) { p.signals[20] = NAN; },
        "signals are not finite at frame 1, taxel 4; record or import it again"}};
   for (const auto& [damage, refusal] : cases) {
     Parts parts;

@@ -12,7 +12,7 @@
 namespace supertac {
 namespace {
 
-const ResampleSettings kWide{.scaling = Scaling{.rest_volts = 3.0, .span_volts = 2.0}};
+const ResampleSettings kWide{.scaling = Scaling{.rest = 3.0, .span = 2.0}};
 
 void remove_frame(Recording& recording, std::size_t i) {
   const auto at = [i](auto& values, std::size_t n) {
@@ -20,7 +20,7 @@ void remove_frame(Recording& recording, std::size_t i) {
     values.erase(first, first + static_cast<std::ptrdiff_t>(n));
   };
   at(recording.time_s, 1);
-  at(recording.volts, kTaxels);
+  at(recording.signals, kTaxels);
   at(recording.position_mm, 2);
 }
 
@@ -37,8 +37,8 @@ TEST(Resample, LeavesARecordingAtItsRateAsItIs) {
   const Recording recording = make_recording({});
   const Track track = resample(recording, kWide);
   ASSERT_EQ(track.frames(), recording.frames());
-  for (std::size_t i = 0; i < recording.volts.size(); ++i)
-    ASSERT_EQ(track.samples[i], (*kWide.scaling)(recording.volts[i])) << i;
+  for (std::size_t i = 0; i < recording.signals.size(); ++i)
+    ASSERT_EQ(track.samples[i], (*kWide.scaling)(recording.signals[i])) << i;
   for (std::size_t i = 0; i < recording.position_mm.size(); ++i)
     ASSERT_NEAR(track.position_mm[i], recording.position_mm[i], 1e-4) << i;
   EXPECT_EQ(track.held, 0U);
@@ -58,7 +58,7 @@ TEST(Resample, AveragesWhatArrivedInAPeriod) {
 TEST(Resample, LooksNoFurtherAheadThanHalfAPeriod) {
   const Recording recording = make_recording({.frames = 901, .rate_hz = 900});
   Recording changed = recording;
-  for (std::size_t i = 32 * kTaxels; i < changed.volts.size(); ++i) changed.volts[i] = 1.5F;
+  for (std::size_t i = 32 * kTaxels; i < changed.signals.size(); ++i) changed.signals[i] = 1.5F;
   const Track before = resample(recording, kWide), after = resample(changed, kWide);
   for (std::size_t i = 0; i < 11 * kTaxels; ++i) ASSERT_EQ(before.samples[i], after.samples[i]);
   EXPECT_NE(before.samples[11 * kTaxels], after.samples[11 * kTaxels]);
@@ -100,7 +100,7 @@ TEST(Resample, CallsASilenceOfOverFiftyMillisecondsAGap) {
 
 TEST(Resample, TakesADamagedFrameAsLost) {
   Recording recording = make_recording({});
-  recording.volts[40 * kTaxels + 3] = std::numeric_limits<float>::quiet_NaN();
+  recording.signals[40 * kTaxels + 3] = std::numeric_limits<float>::quiet_NaN();
   const Track track = resample(recording, kWide);
   EXPECT_EQ(track.damaged, 1U);
   EXPECT_EQ(track.held, 1U);
@@ -139,12 +139,12 @@ TEST(Resample, RefusesTimesThatDoNotIncreaseAndSizesThatDisagree) {
   recording.time_s[7] = recording.time_s[6];
   EXPECT_ERROR(resample(recording, kWide), std::runtime_error, "time stamps must increase, frame 7");
   recording = make_recording({});
-  recording.volts.pop_back();
+  recording.signals.pop_back();
   EXPECT_EQ(what_of<std::runtime_error>([&] { resample(recording, kWide); }),
             "recording: 100 time stamps need 1600 voltages, 0 or 200 coordinates and 0 or 100 lifts, got "
             "1599, 200 and 0; record or import the pass again");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { resample(make_recording({}), {.rate_hz = 0}); }),
-            "resample: rate_hz and max_gap_s must be positive, span_volts not 0, got 0.000000, 0.050000 and "
+            "resample: rate_hz and max_gap_s must be positive, span not 0, got 0.000000, 0.050000 and "
             "0.360000");
 }
 

@@ -18,7 +18,7 @@ Recording even(double low, double high) {
   for (int i = 0; i < kFrames; ++i) {
     recording.time_s.push_back(i / 1000.0);
     for (int k = 0; k < kTaxels; ++k)
-      recording.volts.push_back(static_cast<float>(low + (high - low) * i / (kFrames - 1)));
+      recording.signals.push_back(static_cast<float>(low + (high - low) * i / (kFrames - 1)));
   }
   return recording;
 }
@@ -26,8 +26,8 @@ Recording even(double low, double high) {
 TEST(SignalRange, OfTheRigIsTheRigs) {
   SignalRange range;
   range.add(simulate_pass(Plate::named("3_Bumps"), {}));
-  EXPECT_EQ(range.fitted().rest_volts, Scaling{}.rest_volts);
-  EXPECT_EQ(range.fitted().span_volts, Scaling{}.span_volts);
+  EXPECT_EQ(range.fitted().rest, Scaling{}.rest);
+  EXPECT_EQ(range.fitted().span, Scaling{}.span);
   EXPECT_LT(range.clipped(Scaling{}), 0.01);
 }
 
@@ -52,8 +52,7 @@ TEST(SignalRange, OfAFolderIsWhatItStates) {
   write_recording(folder / "a.safetensors", recording);
   EXPECT_ERROR((void)SignalRange::of_folder(folder.path(), {}), FileError,
                "a.safetensors: has signals from 0 to 1, the sensor's range is 40 to 900 counts");
-  EXPECT_EQ(SignalRange::of_folder(folder.path(), {}, {}, true).clipped({.rest_volts = 1, .span_volts = 1}),
-            0);
+  EXPECT_EQ(SignalRange::of_folder(folder.path(), {}, {}, true).clipped({.rest = 1, .span = 1}), 0);
 }
 
 TEST(SignalRange, OfAnotherSensorHoldsItsSignals) {
@@ -61,8 +60,8 @@ TEST(SignalRange, OfAnotherSensorHoldsItsSignals) {
   range.add(even(68, 102));
   EXPECT_EQ(range.clipped(Scaling{}), 1);
   const Scaling fitted = range.fitted();
-  EXPECT_NEAR(fitted.rest_volts, 101.8, 0.1);
-  EXPECT_NEAR(fitted.span_volts, 37, 0.3);
+  EXPECT_NEAR(fitted.rest, 101.8, 0.1);
+  EXPECT_NEAR(fitted.span, 37, 0.3);
   EXPECT_EQ(range.clipped(fitted), 0);
   EXPECT_EQ(range.text(), "68.136 to 101.797");
 }
@@ -73,27 +72,27 @@ TEST(SignalRange, SeesShortRecordingsWhole) {
   press.signal_scale = {.unit = "kPa", .rest = 0, .span = -1};
   for (int i = 0; i < 40; ++i) {
     press.time_s.push_back(i / 50.0);
-    press.volts.insert(press.volts.end(), kTaxels, static_cast<float>(0.5 * std::sin(3.14 * i / 40)));
+    press.signals.insert(press.signals.end(), kTaxels, static_cast<float>(0.5 * std::sin(3.14 * i / 40)));
   }
   SignalRange range;
   for (int i = 0; i < 100; ++i) range.add(press);
-  EXPECT_EQ(range.fitted().span_volts, -1);
+  EXPECT_EQ(range.fitted().span, -1);
   EXPECT_GE(range.values().size(), 100U * 16 * kTaxels);
 }
 
 TEST(SignalRange, CountsBothSides) {
   SignalRange range;
   range.add(even(0, 1));
-  EXPECT_NEAR(range.clipped({.rest_volts = 0.8, .span_volts = 0.4}), 0.4 + 0.1, 0.01);
+  EXPECT_NEAR(range.clipped({.rest = 0.8, .span = 0.4}), 0.4 + 0.1, 0.01);
 }
 
 TEST(SignalRange, LeavesOutWhatIsNoNumber) {
   Recording recording = even(68, 102);
-  for (std::size_t i = 0; i < recording.volts.size(); i += 3) recording.volts[i] = NAN;
+  for (std::size_t i = 0; i < recording.signals.size(); i += 3) recording.signals[i] = NAN;
   SignalRange range;
   range.add(recording);
-  EXPECT_NEAR(range.fitted().span_volts, 37, 0.3);
-  EXPECT_EQ(SignalRange().fitted().span_volts, Scaling{}.span_volts);
+  EXPECT_NEAR(range.fitted().span, 37, 0.3);
+  EXPECT_EQ(SignalRange().fitted().span, Scaling{}.span);
 }
 
 }  // namespace

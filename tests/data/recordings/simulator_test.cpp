@@ -22,7 +22,7 @@ SimulatorSettings clean() {
 double deepest(const Recording& recording, int taxel) {
   float lowest = 9;
   for (std::size_t i = 0; i < recording.frames(); ++i)
-    lowest = std::min(lowest, recording.volts[i * kTaxels + static_cast<std::size_t>(taxel)]);
+    lowest = std::min(lowest, recording.signals[i * kTaxels + static_cast<std::size_t>(taxel)]);
   return 2.442 - lowest;
 }
 
@@ -34,7 +34,8 @@ double rms_change_mv(const std::string& term) {
       const SimulatorSettings with = without_term({}, "loss");  // frames must correspond
       const Recording a = simulate_pass(Plate::named(plate), {.pass = pass}, with);
       const Recording b = simulate_pass(Plate::named(plate), {.pass = pass}, without_term(with, term));
-      for (std::size_t i = 0; i < a.volts.size(); ++i) sum += std::pow(a.volts[i] - b.volts[i], 2), n += 1;
+      for (std::size_t i = 0; i < a.signals.size(); ++i)
+        sum += std::pow(a.signals[i] - b.signals[i], 2), n += 1;
     }
   return 1000 * std::sqrt(sum / n);
 }
@@ -49,9 +50,9 @@ TEST(Simulator, SameSeedSameRecordingOtherSeedOther) {
   const Plate plate = Plate::named("ridges6");
   const Recording a = simulate_pass(plate, {.pass = 3}), b = simulate_pass(plate, {.pass = 3});
   EXPECT_EQ(a.time_s, b.time_s);
-  EXPECT_EQ(a.volts, b.volts);
-  EXPECT_NE(a.volts, simulate_pass(plate, {.pass = 3}, {}, 2).volts);
-  EXPECT_NE(a.volts, simulate_pass(plate, {.pass = 4}).volts);
+  EXPECT_EQ(a.signals, b.signals);
+  EXPECT_NE(a.signals, simulate_pass(plate, {.pass = 3}, {}, 2).signals);
+  EXPECT_NE(a.signals, simulate_pass(plate, {.pass = 4}).signals);
 }
 
 TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
@@ -63,11 +64,11 @@ TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
     const Recording r = simulate_pass(plate, {.pass = 4}, settings);
     EXPECT_EQ(r.array, array);
     const std::size_t signals = array.signals();
-    ASSERT_EQ(r.volts.size(), r.frames() * signals);
+    ASSERT_EQ(r.signals.size(), r.frames() * signals);
     for (std::size_t k = 0; k < signals; ++k) {
       std::size_t at = 0;
       for (std::size_t i = 0; i < r.frames(); ++i)
-        if (r.volts[i * signals + k] < r.volts[at * signals + k]) at = i;
+        if (r.signals[i * signals + k] < r.signals[at * signals + k]) at = i;
       EXPECT_NEAR(r.position_mm[2 * at + 1] + array.y_mm(static_cast<int>(k)), plate.crests()[0], tolerance)
           << array.text() << ", taxel " << k;
     }
@@ -146,7 +147,7 @@ TEST(Simulator, AFingerThatWandersRocksAsMuchAsSaid) {
         if (r.lift_mm[i] > 0) continue;
         double mean = 0, lines[4] = {};
         for (std::size_t k = 0; k < kTaxels; ++k) {
-          const double load = (rig::kRestVolts - r.volts[i * kTaxels + k]) / settings.volts_per_load / 0.5;
+          const double load = (rig::kRestVolts - r.signals[i * kTaxels + k]) / settings.volts_per_load / 0.5;
           mean += load / kTaxels;
           if (k / 4 == 0) lines[0] += load / 4;
           if (k / 4 == 3) lines[1] += load / 4;
@@ -196,7 +197,7 @@ TEST(Simulator, ResemblesTheRig) {
   const Recording side =
       simulate_pass(Plate::named("3_Bumps"), {.pass = 1});  // half the finger beside the plate
   EXPECT_GT(deepest(side, 7), 4 * deepest(side, 4));
-  for (const float v : middle.volts) {
+  for (const float v : middle.signals) {
     EXPECT_GE(v, 2.091F);
     EXPECT_LE(v, 2.46F);
   }
@@ -217,7 +218,7 @@ TEST(Simulator, LossLeavesGapsInTheStampsNotInTheOrder) {
   settings.lost_fraction = 0.3;
   const Recording r = simulate_pass(Plate::named("bumps6"), {}, settings);
   EXPECT_LT(r.frames(), 3300u);
-  EXPECT_EQ(r.volts.size(), r.frames() * kTaxels);
+  EXPECT_EQ(r.signals.size(), r.frames() * kTaxels);
   EXPECT_EQ(r.position_mm.size(), r.frames() * 2);
   EXPECT_EQ(r.lift_mm.size(), r.frames());
   for (std::size_t i = 1; i < r.frames(); ++i) EXPECT_GT(r.time_s[i], r.time_s[i - 1]);

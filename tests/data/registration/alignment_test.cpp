@@ -92,7 +92,7 @@ std::size_t quiet_place(const Recording& recording, std::size_t lost) {
     if (recording.position_mm[2 * i + 1] < 58 || recording.position_mm[2 * i + 1] > 70) continue;
     double change = 0;
     for (std::size_t k = 0; k < kTaxels; ++k)
-      change += std::abs(recording.volts[(i + lost) * kTaxels + k] - recording.volts[i * kTaxels + k]);
+      change += std::abs(recording.signals[(i + lost) * kTaxels + k] - recording.signals[i * kTaxels + k]);
     if (change < least) least = change, quietest = i;
   }
   return quietest;
@@ -107,7 +107,8 @@ TEST(Alignment, ALongLossThatLeftNoStepIsFound) {
     auto& [recording, registration] = passes[which];
     const std::size_t lost = 400, at = quiet_place(recording, lost);
     const auto from = static_cast<std::ptrdiff_t>(at), to = static_cast<std::ptrdiff_t>(at + lost);
-    recording.volts.erase(recording.volts.begin() + from * kTaxels, recording.volts.begin() + to * kTaxels);
+    recording.signals.erase(recording.signals.begin() + from * kTaxels,
+                            recording.signals.begin() + to * kTaxels);
     recording.position_mm.erase(recording.position_mm.begin() + from * 2,
                                 recording.position_mm.begin() + to * 2);
     const double missing_s = recording.time_s[at + lost] - recording.time_s[at];
@@ -124,7 +125,7 @@ TEST(Alignment, ALongLossThatLeftNoStepIsFound) {
 TEST(Alignment, DeadAndSaturatedTaxelsDoNotMoveAPass) {
   std::vector<Pass> passes = simulated_passes("4_Ridges");
   const double before = scatter(passes);
-  std::vector<float>& volts = passes[4].recording.volts;
+  std::vector<float>& volts = passes[4].recording.signals;
   for (std::size_t i = 0; i < volts.size(); ++i)
     volts[i] = i % kTaxels < 5 ? 2.44F : std::max(volts[i], 2.3F);
   align(passes);
@@ -160,7 +161,7 @@ TEST(Alignment, TwoPassesOrNoneAreLeftAlone) {
 
 TEST(Alignment, AFlatPassAmongOthersIsLeftAlone) {
   std::vector<Pass> passes = simulated_passes("6_Bumps");
-  std::fill(passes[2].recording.volts.begin(), passes[2].recording.volts.end(), 2.44F);
+  std::fill(passes[2].recording.signals.begin(), passes[2].recording.signals.end(), 2.44F);
   const Registration before = passes[2].registration;
   align(passes);
   EXPECT_TRUE(same_place(passes[2].registration, before));

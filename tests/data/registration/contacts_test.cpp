@@ -21,7 +21,7 @@ Recording dips(const std::vector<double>& centres, double depth, double floor = 
       double v = 2.44;
       for (const double c : centres)
         if (k == 6) v -= depth * std::max(0.0, 1 - std::abs(t - c) / 0.2);
-      recording.volts.push_back(static_cast<float>(std::max(v, floor)));
+      recording.signals.push_back(static_cast<float>(std::max(v, floor)));
     }
   }
   return recording;
@@ -48,7 +48,7 @@ TEST(Contacts, IgnoresNoiseFlatSignalsAndHoles) {
   EXPECT_TRUE(find_contacts(Recording{}).empty());
   Recording holes = dips({1.5}, 0.1);
   for (std::size_t i = 700; i < 720; ++i)
-    holes.volts[i * kTaxels + 6] = std::numeric_limits<float>::quiet_NaN();
+    holes.signals[i * kTaxels + 6] = std::numeric_limits<float>::quiet_NaN();
   const auto found = find_contacts(holes);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_NEAR(found[0].time_s, 1.5, 0.005);
@@ -56,7 +56,7 @@ TEST(Contacts, IgnoresNoiseFlatSignalsAndHoles) {
 
 TEST(Contacts, RefusesArraysThatDoNotFit) {
   Recording recording = dips({1.5}, 0.1);
-  recording.volts.pop_back();
+  recording.signals.pop_back();
   EXPECT_EQ(what_of<std::invalid_argument>([&] { find_contacts(recording); }),
             "find_contacts: 3000 frames need 48000 signals, got 47999");
   recording = dips({1.5}, 0.1);

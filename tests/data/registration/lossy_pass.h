@@ -15,7 +15,7 @@ inline constexpr double kBoardHz = 1008.06;
 inline void append_frame(Recording& to, const Recording& from, std::size_t i, double time_s) {
   to.time_s.push_back(time_s);
   const std::size_t signals = from.array.signals();
-  for (std::size_t s = 0; s < signals; ++s) to.volts.push_back(from.volts[i * signals + s]);
+  for (std::size_t s = 0; s < signals; ++s) to.signals.push_back(from.signals[i * signals + s]);
   for (std::size_t axis = 0; axis < 2; ++axis) to.position_mm.push_back(from.position_mm[2 * i + axis]);
 }
 
@@ -23,7 +23,7 @@ inline void append_frame(Recording& to, const Recording& from, std::size_t i, do
 inline Recording slide_of(const Recording& whole) {
   constexpr float kTouchingMm = 0.75F;
   Recording slide = whole;
-  slide.time_s.clear(), slide.volts.clear(), slide.position_mm.clear(), slide.lift_mm.clear();
+  slide.time_s.clear(), slide.signals.clear(), slide.position_mm.clear(), slide.lift_mm.clear();
   double begin = -1;
   for (std::size_t i = 0; i < whole.frames(); ++i) {
     if (whole.lift_mm[i] > kTouchingMm) continue;
@@ -45,7 +45,7 @@ inline void lose(Recording& r, std::size_t at, std::size_t lost) {
   const auto from = static_cast<std::ptrdiff_t>(at),
              to = static_cast<std::ptrdiff_t>(std::min(at + lost, r.frames())),
              signals = static_cast<std::ptrdiff_t>(r.array.signals());
-  r.volts.erase(r.volts.begin() + from * signals, r.volts.begin() + to * signals);
+  r.signals.erase(r.signals.begin() + from * signals, r.signals.begin() + to * signals);
   r.position_mm.erase(r.position_mm.begin() + from * 2, r.position_mm.begin() + to * 2);
   r.time_s.resize(r.frames() - static_cast<std::size_t>(to - from));
 }
@@ -74,7 +74,7 @@ inline Recording like_the_rig(const std::string& plate, int pass, std::uint64_t 
   const Recording full =
       slide_of(simulate_pass(Plate::named(plate), {.pass = pass, .speed_mm_s = speed}, settings, seed));
   Recording text = full;
-  text.time_s.clear(), text.volts.clear(), text.position_mm.clear();
+  text.time_s.clear(), text.signals.clear(), text.position_mm.clear();
   text.source = "imported";
   for (std::size_t i = 0; i < full.frames(); ++i) {
     if (i % 36 >= 29 || full.time_s[i] < late_s || full.time_s[i] > full.time_s.back() - early_s) continue;

@@ -52,7 +52,7 @@ TEST(LostFrames, ALossIsCountedToAFrameOrAFifth) {
   for (std::size_t i = 1000; i + 1000 < whole.frames(); ++i) {
     double change = 0;
     for (std::size_t k = 0; k < kTaxels; ++k)
-      change += std::abs(whole.volts[i * kTaxels + k] - whole.volts[(i - 1) * kTaxels + k]);
+      change += std::abs(whole.signals[i * kTaxels + k] - whole.signals[(i - 1) * kTaxels + k]);
     if (change > most) most = change, at = i;
   }
   for (const std::size_t lost : {1, 5, 20}) {
@@ -76,9 +76,9 @@ TEST(LostFrames, NothingIsFoundWhereNothingIsMissing) {
   EXPECT_LT(std::stod(whole.metadata.at("lost_frames")), 0.005 * frames);
 
   Recording flat = whole;
-  std::fill(flat.volts.begin(), flat.volts.end(), 2.44F);
+  std::fill(flat.signals.begin(), flat.signals.end(), 2.44F);
   for (const double lost : find_lost_frames(flat, kBoardHz)) EXPECT_EQ(lost, 0);
-  std::fill(flat.volts.begin(), flat.volts.end(), std::numeric_limits<float>::quiet_NaN());
+  std::fill(flat.signals.begin(), flat.signals.end(), std::numeric_limits<float>::quiet_NaN());
   for (const double lost : find_lost_frames(flat, kBoardHz)) EXPECT_EQ(lost, 0);
   EXPECT_TRUE(find_lost_frames(Recording{}, kBoardHz).empty());
 }
@@ -87,7 +87,7 @@ TEST(LostFrames, DeadAndSaturatedTaxelsDoNotHideThem) {
   Recording recording = lossy_pass("6_Bumps", 4, 6);
   for (std::size_t i = 0; i < recording.frames(); ++i)
     for (std::size_t k = 0; k < kTaxels; ++k) {
-      float& v = recording.volts[i * kTaxels + k];
+      float& v = recording.signals[i * kTaxels + k];
       if (k % 3 == 0) v = 2.44F;
       if (k % 3 == 1) v = std::max(v, 2.35F);
     }

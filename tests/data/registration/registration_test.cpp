@@ -34,11 +34,12 @@ Error error_of(const Registration& r, const Recording& truth) {
 }
 
 void press_hard(Recording& recording, double gain) {
-  for (float& v : recording.volts) v = static_cast<float>(std::clamp(2.44 - gain * (2.44 - v), 2.091, 2.46));
+  for (float& v : recording.signals)
+    v = static_cast<float>(std::clamp(2.44 - gain * (2.44 - v), 2.091, 2.46));
 }
 
 void kill_taxel(Recording& recording, std::size_t k) {
-  for (std::size_t i = 0; i < recording.frames(); ++i) recording.volts[i * kTaxels + k] = 2.44F;
+  for (std::size_t i = 0; i < recording.frames(); ++i) recording.signals[i * kTaxels + k] = 2.44F;
 }
 
 // The fit takes leading and trailing rows to respond alike. A tilted finger does not: 0.01 mm/mm moves the
@@ -149,7 +150,7 @@ TEST(Registration, FlagsWhatCannotBeFitted) {
   for (std::size_t k = 0; k < kTaxels; ++k) kill_taxel(silent, k);
   EXPECT_EQ(register_pass(silent, Plate::named("6_Ridges")).reason, "no taxel felt anything");
   Recording brief = pass;
-  brief.time_s.resize(2000), brief.volts.resize(2000 * kTaxels);
+  brief.time_s.resize(2000), brief.signals.resize(2000 * kTaxels);
   EXPECT_FALSE(register_pass(brief, Plate::named("6_Ridges")).reliable);
   const Registration wrong = register_pass(pass, Plate::named("4_Ridges"));
   EXPECT_FALSE(wrong.reliable) << wrong.matched << ' ' << wrong.coverage << ' ' << wrong.residual;

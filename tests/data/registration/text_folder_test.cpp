@@ -28,8 +28,8 @@ std::vector<ImportedPass> import_all(const std::string& root, const FolderImport
 
 std::string as_text(const Recording& recording) {
   std::string text;
-  for (std::size_t i = 0; i < recording.volts.size(); ++i)
-    text += std::to_string(recording.volts[i]) + (i % kTaxels == kTaxels - 1 ? "\n" : " ");
+  for (std::size_t i = 0; i < recording.signals.size(); ++i)
+    text += std::to_string(recording.signals[i]) + (i % kTaxels == kTaxels - 1 ? "\n" : " ");
   return text;
 }
 
@@ -74,7 +74,7 @@ TEST(TextFolder, EveryFrameGetsItsPlaceAndTheOrderIsTheStatedOne) {
     apply(by_hand[i].registration, by_hand[i].recording, rig::pass_x_mm(by_hand[i].recording.pass));
     const Recording& r = imported[i].recording;
     EXPECT_EQ(r.time_s, by_hand[i].recording.time_s);
-    EXPECT_EQ(r.volts, by_hand[i].recording.volts);
+    EXPECT_EQ(r.signals, by_hand[i].recording.signals);
     EXPECT_TRUE(imported[i].registration.reliable) << imported[i].registration.reason;
     EXPECT_GT(imported[i].registration.agreement, 0.8);
     EXPECT_EQ(r.plate, "6_Ridges");

@@ -128,7 +128,7 @@ TEST(Baselines, AllButRidgeSeeTheLastFrameOnly) {
 
 TEST(Baselines, ASignalThatNeverChangesGivesTheMean) {
   Recording rest = make_recording({.frames = 300, .start_y_mm = 50});
-  std::fill(rest.volts.begin(), rest.volts.end(), 2.4F);
+  std::fill(rest.signals.begin(), rest.signals.end(), 2.4F);
   WindowSet set(wide_settings(16));
   set.add(rest);
   const UpsampledFrame bicubic(set, all_of(set));

@@ -68,7 +68,7 @@ TEST(Ridge, OnePassIsEnoughAndADeadArrayGivesTheMean) {
   const WindowSet one = make_set(0.01, 1);
   EXPECT_LT(mean_error(one, {5, 300}, Ridge(one, all_of(one))), 0.02);
   Recording rest = make_recording({.frames = 300, .start_y_mm = 50});
-  std::fill(rest.volts.begin(), rest.volts.end(), 3.0F);
+  std::fill(rest.signals.begin(), rest.signals.end(), 3.0F);
   WindowSet set(wide_settings(kSteps));
   set.add(rest);
   const auto train = all_of(set);

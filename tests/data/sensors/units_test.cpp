@@ -31,8 +31,8 @@ TEST(Units, CountsThatRiseGiveTheWindowsOfVoltsThatFall) {
     SignalRange range;
     range.add(recording);
     WindowSettings settings{.timesteps = 32, .scaling = range.fitted()};
-    EXPECT_EQ(settings.scaling.rest_volts, recording.signal_scale.rest);
-    EXPECT_EQ(settings.scaling.span_volts, recording.signal_scale.span);
+    EXPECT_EQ(settings.scaling.rest, recording.signal_scale.rest);
+    EXPECT_EQ(settings.scaling.span, recording.signal_scale.span);
     sets.emplace_back(settings).add(recording);
   }
   ASSERT_EQ(sets[0].size(), sets[1].size());
@@ -51,8 +51,8 @@ TEST(Units, ARangeThatIsNotTheStatedOneIsFoundTheRightWayUp) {
   recording.signal_scale.span = -1e9;  // the signals fill a sixtieth
   SignalRange range;
   range.add(recording);
-  EXPECT_LT(range.fitted().span_volts, 0);
-  EXPECT_NEAR(range.fitted().rest_volts, 1000, 1e6);
+  EXPECT_LT(range.fitted().span, 0);
+  EXPECT_NEAR(range.fitted().rest, 1000, 1e6);
   EXPECT_LT(range.clipped(range.fitted()), 0.02);
 }
 
@@ -69,7 +69,7 @@ TEST(Units, AFolderOfTwoIsRefusedByName) {
 
 TEST(Units, RandomPassesSpeakTheSensorsLanguage) {
   const Recording recording = counts();
-  WindowSet windows({.timesteps = 32, .scaling = {.rest_volts = kCounts.rest, .span_volts = kCounts.span}});
+  WindowSet windows({.timesteps = 32, .scaling = {.rest = kCounts.rest, .span = kCounts.span}});
   windows.add(recording);
   const std::size_t before = windows.size();
   add_random_passes(windows, {.count = 2});

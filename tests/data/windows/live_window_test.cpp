@@ -19,10 +19,10 @@ namespace supertac {
 namespace {
 
 constexpr int kTimesteps = 16;
-const Scaling kWide{.rest_volts = 3.0, .span_volts = 2.0};
+const Scaling kWide{.rest = 3.0, .span = 2.0};
 
 std::span<const float, kTaxels> volts_of(const Recording& recording, std::size_t frame) {
-  return std::span(recording.volts).subspan(frame * kTaxels).first<kTaxels>();
+  return std::span(recording.signals).subspan(frame * kTaxels).first<kTaxels>();
 }
 
 LiveWindowSettings live_settings(double sensor_rate_hz) {
@@ -43,7 +43,8 @@ void feed(LiveWindow& live, const Recording& recording,
 Recording first_frames(const Recording& whole, std::size_t frames) {
   Recording part;
   part.time_s.assign(whole.time_s.begin(), whole.time_s.begin() + static_cast<std::ptrdiff_t>(frames));
-  part.volts.assign(whole.volts.begin(), whole.volts.begin() + static_cast<std::ptrdiff_t>(frames * kTaxels));
+  part.signals.assign(whole.signals.begin(),
+                      whole.signals.begin() + static_cast<std::ptrdiff_t>(frames * kTaxels));
   return part;
 }
 
@@ -89,13 +90,13 @@ Recording rough_recording(double rate_hz, double lost, std::uint64_t seed) {
   const Recording smooth =
       make_recording({.frames = static_cast<std::size_t>(2 * rate_hz), .rate_hz = rate_hz});
   Recording rough = smooth;
-  rough.time_s.clear(), rough.volts.clear(), rough.position_mm.clear();
+  rough.time_s.clear(), rough.signals.clear(), rough.position_mm.clear();
   for (std::size_t i = 0; i < smooth.frames(); ++i) {
     if (random.uniform(3 * i) < lost) continue;
     const double gap = i > smooth.frames() / 2 ? 0.3 : 0;
     rough.time_s.push_back(smooth.time_s[i] + gap + 0.4 * (random.uniform(3 * i + 1) - 0.5) / rate_hz);
     for (int k = 0; k < kTaxels; ++k)
-      rough.volts.push_back(1 + 2 * static_cast<float>(random.uniform(1000 + kTaxels * i + k)));
+      rough.signals.push_back(1 + 2 * static_cast<float>(random.uniform(1000 + kTaxels * i + k)));
     rough.position_mm.insert(rough.position_mm.end(), {18.0F, 30.0F});
   }
   return rough;
@@ -193,9 +194,9 @@ TEST(LiveWindow, ALostFrameBeforeTheOldestSampleIsHeldFromFurtherBack) {
     if (i < 12 || i > 16) live.push(recording.time_s[i], volts_of(recording, i));
   Window window(kTimesteps * kTaxels);
   ASSERT_TRUE(live.window(window));  // frames 14 ... 29; 14, 15, 16 repeat 11
-  const float held = kWide(recording.volts[11 * kTaxels]);
+  const float held = kWide(recording.signals[11 * kTaxels]);
   for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(window[n * kTaxels], held);
-  EXPECT_EQ(window[3 * kTaxels], kWide(recording.volts[17 * kTaxels]));
+  EXPECT_EQ(window[3 * kTaxels], kWide(recording.signals[17 * kTaxels]));
 }
 
 TEST(LiveWindow, StartsAnewAfterAGapEvenOneLongerThanTheWindow) {
@@ -209,7 +210,7 @@ TEST(LiveWindow, StartsAnewAfterAGapEvenOneLongerThanTheWindow) {
       EXPECT_EQ(live.window(window), spans) << "frame " << frame << ", gap " << gap;
     });
     EXPECT_EQ(live.counters().gaps, 1U);
-    EXPECT_EQ(window[0], kWide(recording.volts[44 * kTaxels]));
+    EXPECT_EQ(window[0], kWide(recording.signals[44 * kTaxels]));
   }
 }
 
@@ -254,7 +255,7 @@ TEST(LiveWindow, RefusesSettingsOutOfRangeAndAWrongRoom) {
   const std::pair<LiveWindowSettings, const char*> cases[] = {
       {{.timesteps = 0}, "timesteps must be at least 1, got 0"},
       {{.rate_hz = 0},
-       "rate_hz, frame_period_s and max_gap_s must be positive, span_volts not 0, got 0.000000, 0.003333, "
+       "rate_hz, frame_period_s and max_gap_s must be positive, span not 0, got 0.000000, 0.003333, "
        "0.050000 and 0.360000"},
       {{.filter_s = -1}, "filter_s must not be negative, got -1.000000"},
       {{.filter_s = std::nan("")}, "filter_s must not be negative, got nan"}};

@@ -61,7 +61,7 @@ WindowSet many(WindowSettings settings, std::size_t count) {
   WindowSet windows(settings);
   Recording pass = simulate_pass(Plate::named("3_Bumps"), {});
   pass.array = settings.array.value_or(pass.array);
-  pass.volts.resize(pass.time_s.size() * pass.array.signals());
+  pass.signals.resize(pass.time_s.size() * pass.array.signals());
   while (windows.size() < count) windows.add(pass);
   return windows;
 }
@@ -145,7 +145,7 @@ TEST(SilentPasses, BeyondTheFirst300AreOfAFingerThatHardlyTouches) {
 TEST(SilentPasses, AreTheSameForTheSameSeedAndFitAnyArrayAndRange) {
   WindowSettings settings = small();
   settings.array = TaxelArray{.rows = 3, .columns = 5};
-  settings.scaling = {.rest_volts = 40, .span_volts = 40};
+  settings.scaling = {.rest = 40, .span = 40};
   settings.scaling.per_window = false;
   const WindowSet others = many(settings, 24'000);
   WindowSet a = others, b = others, c = others;

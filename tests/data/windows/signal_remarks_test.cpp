@@ -23,7 +23,7 @@ Remarks remarks_after(const std::string& plate, void (*change)(Recording&)) {
 
 void set_taxels(Recording& recording, int taxels, float volts) {
   for (std::size_t i = 0; i < recording.frames(); ++i)
-    for (int k = 0; k < taxels; ++k) recording.volts[16 * i + static_cast<std::size_t>(k)] = volts;
+    for (int k = 0; k < taxels; ++k) recording.signals[16 * i + static_cast<std::size_t>(k)] = volts;
 }
 
 TEST(SignalRemarks, SayNothingWhenAllIsWell) {
@@ -41,14 +41,14 @@ TEST(SignalRemarks, NameADeadSensor) {
   EXPECT_EQ(remarks_after("6_Bumps", [](Recording& r) { set_taxels(r, 16, 2.41F); }), Remarks{dead});
   EXPECT_EQ(remarks_after("6_Bumps",
                           [](Recording& r) {
-                            for (float& v : r.volts) v += 5;
+                            for (float& v : r.signals) v += 5;
                           }),
             Remarks{dead});
 }
 
 TEST(SignalRemarks, NameSaturation) {
   const Remarks remarks = remarks_after("6_Bumps", [](Recording& r) {
-    for (float& v : r.volts) v = std::min(v, 2.45F - 8 * (2.45F - v));
+    for (float& v : r.signals) v = std::min(v, 2.45F - 8 * (2.45F - v));
   });
   ASSERT_EQ(remarks.size(), 1U);
   EXPECT_NE(remarks[0].find(" % of the signals lie at the end of the model's range"), std::string::npos)

@@ -31,7 +31,7 @@ TEST(Windows, AreTheLastFramesOfAPass) {
   set.window(3, window);
   EXPECT_EQ(set.frame_of(3), 18U);
   for (std::size_t i = 0; i < window.size(); ++i)
-    ASSERT_EQ(window[i], set.settings().scaling(recording.volts[3 * kTaxels + i]));
+    ASSERT_EQ(window[i], set.settings().scaling(recording.signals[3 * kTaxels + i]));
   EXPECT_EQ(set.last_frame(3), std::vector<float>(window.end() - kTaxels, window.end()));
   EXPECT_NEAR(set.position(3).y_mm, 30 + 18 * 10.0 / 300, 1e-4);
   EXPECT_EQ(set.position(3).x_mm, 18);
@@ -211,7 +211,7 @@ TEST(Windows, RefuseSettingsOutOfRange) {
       {{.timesteps = 0}, "timesteps must be at least 1, got 0"},
       {{.stride = 0}, "stride must be at least 1, got 0"},
       {{.rate_hz = 0},
-       "rate_hz and max_gap_s must be positive, span_volts not 0, got 0.000000, 0.050000 and 0.360000"}};
+       "rate_hz and max_gap_s must be positive, span not 0, got 0.000000, 0.050000 and 0.360000"}};
   for (const auto& [settings, refusal] : cases)
     EXPECT_EQ(what_of<std::invalid_argument>([&] { WindowSet{settings}; }),
               std::string("windows: ") + refusal);
@@ -251,7 +251,7 @@ TEST(Windows, FingerprintTellsDataApart) {
 Recording with_truth(std::size_t frames, const TaxelArray& array) {
   Recording recording = make_recording({.plate = "a sponge", .frames = frames});
   recording.array = array;
-  recording.volts.resize(frames * array.signals());
+  recording.signals.resize(frames * array.signals());
   recording.position_mm.clear();
   recording.truth_height = 4 * array.rows, recording.truth_width = 4 * array.columns;
   recording.truth.assign(frames * array.picture(4).pixels(), 0.5F);
@@ -297,7 +297,7 @@ TEST(Windows, OfOneFrameAreTheRecordedFrames) {
   ASSERT_EQ(set.size(), 100U);
   std::vector<float> truth(96);
   for (std::size_t i = 0; i < 100; ++i) {
-    EXPECT_EQ(set.window(i)[0], set.settings().scaling(recording.volts[6 * i]));
+    EXPECT_EQ(set.window(i)[0], set.settings().scaling(recording.signals[6 * i]));
     set.truth(i, truth);
     EXPECT_EQ(truth[0], recording.truth[96 * i]);
   }

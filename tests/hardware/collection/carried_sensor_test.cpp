@@ -115,7 +115,7 @@ struct CarriedSensor {
   double worst(const CollectedPass& pass) const {
     double worst = 0;
     for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
-      const float* frame = &pass.volts[64 * i];
+      const float* frame = &pass.signals[64 * i];
       // The second value of a frame is that of taxel 8: row 1, column 0.
       const auto number = static_cast<std::uint64_t>(frame[0] + 1000 * frame[8]);
       const double* p = &pass.position[3 * i];
@@ -145,8 +145,8 @@ TEST(CarriedSensor, EveryFrameHasItsPositionWithAndWithoutTimeStamps) {
     EXPECT_EQ(pass.missing + pass.left_out, 0U);
     EXPECT_NEAR(static_cast<double>(pass.time_s.size()), 840, 25);  // 60 mm, and up and down
     EXPECT_LT(run.worst(pass), 0.05) << "stamped " << stamped;
-    EXPECT_EQ(pass.volts.size(), 64 * pass.time_s.size());
-    const float* first = pass.volts.data();
+    EXPECT_EQ(pass.signals.size(), 64 * pass.time_s.size());
+    const float* first = pass.signals.data();
     EXPECT_EQ(first[9], (first[0] + first[8] + 6 * 100) / 8) << "a dead taxel is the mean of those around";
   }
 }
@@ -206,7 +206,7 @@ TEST(CarriedSensor, AReplayGivesTheSameFrames) {
   EXPECT_TRUE(second.outcome.complete) << second.outcome.note;
   const CollectedPass a = collection_of(journal).passes.at(0), b = collection_of(run.journal()).passes.at(0);
   EXPECT_EQ(a.time_s, b.time_s);
-  EXPECT_EQ(a.volts, b.volts);
+  EXPECT_EQ(a.signals, b.signals);
   EXPECT_EQ(a.position, b.position);
 }
 

@@ -40,7 +40,7 @@ TEST(Collection, AReplayGivesTheSameFramesAndTheSameRun) {
   const Collection a = collection_of(journal), b = bench.collect();
   ASSERT_EQ(a.passes.size(), b.passes.size());
   EXPECT_EQ(a.passes[0].time_s, b.passes[0].time_s);
-  EXPECT_EQ(a.passes[0].volts, b.passes[0].volts);
+  EXPECT_EQ(a.passes[0].signals, b.passes[0].signals);
   EXPECT_EQ(a.passes[0].position, b.passes[0].position);
   EXPECT_GT(a.passes[0].time_s.size(), 9000U);
 }

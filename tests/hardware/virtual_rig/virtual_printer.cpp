@@ -254,7 +254,7 @@ void VirtualPrinter::start_next(double t) {
   if (random_trouble(t)) return;
   const std::string& front = queue_.front();
   const bool is_move = front.starts_with("G1") || front.starts_with("G0");
-  if (is_move && motion_.full(t)) {  // its ok waits for room in the planner
+  if (is_move && motion_.full(t)) {  // its ok waits for room in the compiler
     repeat_after_block_ = true;
     return block_until(motion_.next_end(), t);
   }

@@ -284,7 +284,7 @@ void VirtualPrinter::overheat(double t) {
   kill(t, "Error:MAXTEMP triggered, system stopped! Heater_ID: E0\n\necho:Err: MAXTEMP\n");
 }
 
-// The planner's buffer is kept clean for a second; whatever held the firmware ends with it.
+// The compiler's buffer is kept clean for a second; whatever held the firmware ends with it.
 void VirtualPrinter::quick_stop(double t) {
   motion_.stop(t);
   if (!blocked_) repeat_after_block_ = true;

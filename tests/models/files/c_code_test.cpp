@@ -9,7 +9,7 @@
 
 #include "data/windows/live_window.h"
 #include "io/files/file.h"
-#include "models/inference/prepared/prepared.h"
+#include "models/inference/compiled/compiled_model.h"
 #include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 #include "tests/models/support.h"
@@ -84,7 +84,7 @@ std::vector<SuperTacSettings> all_settings() {
   return all;
 }
 
-TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
+TEST(CCode, DrawsTheBitsOfACompiledModel) {
   if (!has_compiler()) GTEST_SKIP() << "no C compiler";
   for (const SuperTacSettings& settings : all_settings())
     for (const char* flags :
@@ -97,7 +97,7 @@ TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
       const Compiled code(exported, flags);
       const auto draw = code.function<void(const float*, float*, float*)>("finger_draw");
       const Tensor windows = uniform(file.model->input_shape(5), 7);
-      const Estimate expected = Prepared(*file.model, *file.ranges).estimate(windows);
+      const Estimate expected = CompiledModel(*file.model, *file.ranges).estimate(windows);
       const auto pixels = static_cast<std::size_t>(expected.picture.size() / 5);
       std::vector<float> picture(pixels), predicted_error(pixels);
       EXPECT_EQ(code.function<SelfTest>("finger_self_test")(picture.data(), predicted_error.data()),
@@ -137,7 +137,7 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
                        .scaling = file.input.scaling,
                        .filter_s = filter_s,
                        .frame_period_s = 1 / sensor_hz});
-      const Prepared prepared(*file.model, *file.ranges);
+      const CompiledModel compiled(*file.model, *file.ranges);
       Tensor window(file.model->input_shape(1));
       const Tensor noise = uniform(Shape{400, 17}, 11);
       std::vector<float> picture(256), predicted_error(256), frame(16);
@@ -158,7 +158,7 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
         ASSERT_EQ(draw(picture.data(), predicted_error.data()) == 1, due) << "frame " << i;
         if (!due) continue;
         ++pictures;
-        const Estimate expected = prepared.estimate(window);
+        const Estimate expected = compiled.estimate(window);
         ASSERT_TRUE(std::ranges::equal(picture, expected.picture.values())) << "frame " << i;
       }
       EXPECT_GT(pictures, 150);

@@ -25,7 +25,7 @@ TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
   EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
   EXPECT_EQ(file.model->settings().latent, 3);
   EXPECT_TRUE(file.model->settings().last_frame_path);
-  EXPECT_EQ(file.input.scaling.rest_volts, 2.5);
+  EXPECT_EQ(file.input.scaling.rest, 2.5);
   EXPECT_TRUE(file.input.scaling.per_window);
   EXPECT_EQ(file.input.filter_s, 0.0992);
   EXPECT_EQ(file.metadata.at("split"), "trial");
@@ -97,7 +97,7 @@ TEST(ModelFile, TheFileNeverSizesAnything) {
                {settings("32", "4"), input, "encoder.0.mean.weight expected F32 [4,64], found F32 [3,64]"},
                {"[[[[", input, "metadata \"settings\""},
                {settings("32", "3"), R"({"rate_hz":300,"rest_volts":2.45,"span_volts":0,"filter_s":null})",
-                "|span_volts| 1e-6 to 2e9, filter_s 0 to 10"}};
+                "|span| 1e-6 to 2e9, filter_s 0 to 10"}};
   for (const auto& c : cases) {
     write(c.settings, c.input);
     EXPECT_NE(load_error(path).find(c.refusal), std::string::npos) << load_error(path);

@@ -8,7 +8,7 @@
 #include "io/numbers/hash.h"
 #include "models/files/onnx.h"
 #include "models/files/onnx_file.h"
-#include "models/inference/prepared/prepared.h"
+#include "models/inference/compiled/compiled_model.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -57,7 +57,7 @@ void write_case(const TemporaryFolder& folder, const std::string& name, const Mo
   for (Dim n = 0; n < count && file.input.scaling.per_window; ++n)
     normalise_window(windows.values().subspan(static_cast<std::size_t>(n) * size, size),
                      static_cast<std::size_t>(windows.dim(2)));
-  const Estimate drawn = Prepared(*file.model).estimate(windows);
+  const Estimate drawn = CompiledModel(*file.model).estimate(windows);
   const auto array = [](const std::string& called, const Tensor& t) {
     TensorToWrite out{called, "F32", {}, std::as_bytes(std::span<const real>(t.values()))};
     for (int i = 0; i < std::min(t.rank(), 3); ++i) out.shape.push_back(static_cast<std::uint64_t>(t.dim(i)));

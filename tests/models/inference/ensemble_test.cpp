@@ -23,10 +23,10 @@ TEST(Ensemble, AveragesPicturesAndAddsTheirVarianceToPredictedErrors) {
     settings.predicted_error = predicts;
     for (std::uint64_t m = 0; m < 2; ++m) save_model(paths[m], random_network(settings, m + 1), {}, {});
     const std::vector<ModelFile> files = load_models(paths);
-    const Estimate a = Prepared(*files[0].model).estimate(windows),
-                   b = Prepared(*files[1].model).estimate(windows),
+    const Estimate a = CompiledModel(*files[0].model).estimate(windows),
+                   b = CompiledModel(*files[1].model).estimate(windows),
                    both = ensemble_of(files).estimate(windows);
-    EXPECT_TRUE(std::ranges::equal(Ensemble({Prepared(*files[0].model)}).infer(windows).values(),
+    EXPECT_TRUE(std::ranges::equal(Ensemble({CompiledModel(*files[0].model)}).infer(windows).values(),
                                    a.picture.values()));
     ASSERT_EQ(both.picture.shape(), a.picture.shape());
     ASSERT_EQ(both.predicted_error.defined(), predicts);
@@ -78,7 +78,7 @@ TEST(Ensemble, RefusesNetworksOfOtherInputs) {
   const SuperTac one = random_network(), longer = random_network(twice_as_long);
   EXPECT_EQ(
       what_of<std::invalid_argument>([&] {
-        Ensemble({Prepared(one), Prepared(longer)});
+        Ensemble({CompiledModel(one), CompiledModel(longer)});
       }),
       "Ensemble: expected networks of one format, got one of 32 frame(s) of 4x4 taxels with 1 channel(s) and "
       "pictures of 8x8 and one of 64 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8");

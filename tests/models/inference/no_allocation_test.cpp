@@ -1,4 +1,4 @@
-// A warm training step and a warm inference, prepared or not, go to the heap not once.
+// A warm training step and a warm inference, compiled or not, go to the heap not once.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -25,10 +25,10 @@ TEST(NoAllocation, WarmTrainingStep) {
 
 TEST(NoAllocation, WarmInference) {
   const SuperTac network = random_network(SuperTacSettings::of_preset("paper"));
-  const Prepared prepared(network);
+  const CompiledModel compiled(network);
   const Tensor one = uniform(network.input_shape(1), 1), many = uniform(network.input_shape(9), 1);
   EXPECT_EQ(allocations_of_five([&] { network.infer(one); }), 0);
-  EXPECT_EQ(allocations_of_five([&] { prepared.estimate(one), prepared.estimate(many); }), 0);
+  EXPECT_EQ(allocations_of_five([&] { compiled.estimate(one), compiled.estimate(many); }), 0);
 }
 
 }  // namespace

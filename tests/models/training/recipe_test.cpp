@@ -33,14 +33,14 @@ TEST(Recipe, ComesBackFromTheModelFile) {
     recipe.plates = {"3_Bumps", "4_Ridges"}, recipe.leave_out = {"4_Ridges"};
     recipe.split = SplitKind::texture;
     recipe.stride = 4, recipe.random_plates = 9, recipe.interval_factor = PixelInterval{0.5, 3};
-    recipe.range = Scaling{.rest_volts = 2, .span_volts = 0.5};
+    recipe.range = Scaling{.rest = 2, .span = 0.5};
     recipe.augment.dropped = 1, recipe.mirror = true;
     const std::string path = folder / (std::string(name) + ".safetensors");
     const Recipe back = Recipe::of(file_of(recipe, path), path);
     EXPECT_EQ(metadata_of(back), metadata_of(recipe)) << name;
     EXPECT_EQ(model_metadata(back.model, {}), model_metadata(recipe.model, {})) << name;
     EXPECT_EQ(back.rate_hz, recipe.rate_hz);
-    EXPECT_EQ(back.range->span_volts, 0.5);
+    EXPECT_EQ(back.range->span, 0.5);
     EXPECT_EQ(back.sampling, recipe.sampling);
     EXPECT_EQ(back.muon, recipe.muon);
   }
@@ -72,7 +72,7 @@ TEST(Recipe, RefusesWhatNoTrainingHas) {
   EXPECT_EQ(message([](Recipe& r) { r.rate_hz = 5; }), "recipe: expected rate_hz from 20 to 2000, got 5");
   EXPECT_EQ(message([](Recipe& r) { r.random_plates = -1; }),
             "recipe: expected random_plates from 0 to 50000, got -1");
-  EXPECT_EQ(message([](Recipe& r) { r.range = Scaling{.rest_volts = 1, .span_volts = 0}; }),
+  EXPECT_EQ(message([](Recipe& r) { r.range = Scaling{.rest = 1, .span = 0}; }),
             "recipe: expected a span that is not 0, got 0");
   EXPECT_NE(message([](Recipe& r) { r.leave_out = {"3_Bumps"}; }).find("--split texture"), std::string::npos);
   EXPECT_EQ(message([](Recipe& r) { r.epochs = 0; }), "training settings: epochs must be 1 to 100000, got 0");

@@ -40,7 +40,7 @@ TEST(Trainer, WithoutSamplingLatentsAreTheMeans) {
     small.recipe.sampling = sampling;
     Trainer trainer = small.trainer();
     const ZoneMetrics scores =
-        score(Ensemble({Prepared(trainer.model())}), small.windows, all_of(small.windows));
+        score(Ensemble({CompiledModel(trainer.model())}), small.windows, all_of(small.windows));
     const double inferred = std::pow(10, -scores.all().psnr_pooled_db / 10);
     return std::abs(trainer.train_step().l2 - inferred) / inferred;
   };
@@ -86,7 +86,7 @@ TEST(Trainer, LearnsFromAugmentedAndMirroredWindows) {
 /// Blurred blobs on an array of 3 x 5 taxels with two channels, drawn four times as fine: five recordings
 /// with measured truths.
 WindowSet blobs() {
-  WindowSet frames({.timesteps = 1, .scale = 4, .scaling = {.rest_volts = 1000, .span_volts = 200}});
+  WindowSet frames({.timesteps = 1, .scale = 4, .scaling = {.rest = 1000, .span = 200}});
   const RandomStream random(4, 0);
   for (std::uint64_t group = 0; group < 5; ++group) {
     Recording r;
@@ -100,7 +100,7 @@ WindowSet blobs() {
       r.time_s.push_back(static_cast<double>(i));
       for (int k = 0; k < 15; ++k) {
         const float v = blob(k / 5 + 0.5, k % 5 + 0.5, 2);
-        r.volts.insert(r.volts.end(), {1000 - 200 * v, 900 - 100 * v});
+        r.signals.insert(r.signals.end(), {1000 - 200 * v, 900 - 100 * v});
       }
       for (int p = 0; p < 240; ++p) r.truth.push_back(blob((p / 20 + 0.5) / 4, (p % 20 + 0.5) / 4, 0.5));
     }
@@ -137,7 +137,7 @@ TEST(Trainer, LearnsFromSingleFrames) {
   while (!trainer.done()) after = trainer.train_step().l2;
   EXPECT_LT(after, before / 10);
   const std::vector<std::uint32_t> unseen = {32, 33, 34, 35, 36, 37, 38, 39};
-  const Metrics scores = score(Ensemble({Prepared(trainer.model())}), frames, unseen).contact();
+  const Metrics scores = score(Ensemble({CompiledModel(trainer.model())}), frames, unseen).contact();
   EXPECT_EQ(scores.windows, 8u);
   EXPECT_GT(scores.psnr_mean_db, 18);
 }

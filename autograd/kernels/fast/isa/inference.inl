@@ -1,4 +1,4 @@
-// The loops of prepared networks (inference.h), over the same vector type as kernels.inl and included
+// The loops of compiled models (inference.h), over the same vector type as kernels.inl and included
 // behind winograd.inl.
 
 // The pixels of a job one after another.

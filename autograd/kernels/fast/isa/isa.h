@@ -79,7 +79,7 @@ struct IsaKernels {
   /// to[j * to_step + i] = from[i * from_step + j] for i < rows, j < columns
   void (*transpose)(Dim rows, Dim columns, const real* from, Dim from_step, real* to, Dim to_step) = nullptr;
 
-  // Of prepared networks, see inference.h. `x` of patches and plane_conv begins with the margin.
+  // Of compiled models, see inference.h. `x` of patches and plane_conv begins with the margin.
   void (*product)(const ProductJob& job, const real* x, real* y) = nullptr;
   void (*map_patches)(const MapTileJob& job, const real* x, real* places) = nullptr;
   void (*places)(const PlacesJob& job, const real* v, const real* u, real* m) = nullptr;

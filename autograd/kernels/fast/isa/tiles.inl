@@ -1,4 +1,4 @@
-// Winograd's products of prepared networks (inference.h), over the same vector type as kernels.inl and
+// Winograd's products of compiled models (inference.h), over the same vector type as kernels.inl and
 // included behind winograd.inl.
 
 template <int kSquare>

@@ -18,18 +18,18 @@ const std::vector<float> kVolts(16, 2.4F), kPicture(256, 0.5F), kHalf(256, 0.25F
 
 const std::string kAbout = about_lines({}, "V", {});
 
-Seen seen(std::uint64_t number) {
+LiveFrame seen(std::uint64_t number) {
   return {.number = number,
           .time_s = static_cast<double>(number) / 1008,
           .wall_s = NAN,
-          .volts = kVolts,
+          .signals = kVolts,
           .picture = kPicture,
           .half_widths = {},
           .distance = {}};
 }
 
 TEST(PictureLine, HoldsWhatIsKnownAndNothingElse) {
-  Seen one = seen(3);
+  LiveFrame one = seen(3);
   const std::string about = about_lines({.rows = 2, .columns = 8, .pitch_mm = 5}, "N", {8, 32, 1.25});
   const std::string line = picture_line(one, {2.5, 3}, false, about);
   EXPECT_TRUE(line.ends_with("}\n"));
@@ -55,7 +55,7 @@ TEST(PictureLine, HoldsWhatIsKnownAndNothingElse) {
   EXPECT_EQ(json["distance"], 1.5);
   EXPECT_EQ(json["unlike_training"], 1);
   const std::vector<float> strange(16, std::nanf(""));
-  one.volts = strange;
+  one.signals = strange;
   EXPECT_TRUE(parse_json_limited(picture_line(one, {}, true, about))["volts"][0].is_null());
 }
 

@@ -113,7 +113,7 @@ TEST(FilmTruth, LandsOnTheFramesThatFeltIt) {
   recording.signal_scale = {.unit = "counts", .rest = 0, .span = -100};
   recording.time_s = c.sensor_s;
   for (const double load : c.sensor)
-    for (int k = 0; k < 4; ++k) recording.volts.push_back(static_cast<float>(25 * load));
+    for (int k = 0; k < 4; ++k) recording.signals.push_back(static_cast<float>(25 * load));
   Table film;
   film.columns = 17, film.shape = {17};
   for (std::size_t i = 0; i < c.film.size(); ++i) {
@@ -148,7 +148,7 @@ TEST(FilmTruth, OfOneClockIsPutInTimeWhereItLags) {
     recording.truth_height = recording.truth_width = 2;
     for (std::size_t i = 0; i < c.film.size(); ++i) {
       recording.time_s.push_back(c.film_s[i]);
-      recording.volts.push_back(static_cast<float>(100 * c.sensor[i]));
+      recording.signals.push_back(static_cast<float>(100 * c.sensor[i]));
       recording.truth.insert(recording.truth.end(), 4,
                              static_cast<float>(std::clamp(c.film[i] / 40, 0.0, 1.0)));
     }

@@ -47,8 +47,8 @@ TEST(PairImport, ARecordingForEachGroupWithChannelsLastAndItsTruth) {
   EXPECT_EQ(seven.signal_scale.low(), 0);
   EXPECT_EQ(seven.signal_scale.high(), 299);
   // The third frame of group 7 is pair 4, which begins at 120; row 1, column 2 of its channels:
-  EXPECT_EQ(seven.volts[2 * 30 + (1 * 5 + 2) * 2], 120 + 7);
-  EXPECT_EQ(seven.volts[2 * 30 + (1 * 5 + 2) * 2 + 1], 120 + 15 + 7);
+  EXPECT_EQ(seven.signals[2 * 30 + (1 * 5 + 2) * 2], 120 + 7);
+  EXPECT_EQ(seven.signals[2 * 30 + (1 * 5 + 2) * 2 + 1], 120 + 15 + 7);
   EXPECT_EQ(seven.truth[2 * 240 + 3], static_cast<float>((4 * 240 + 3) % 101) / 100);
   write_recording(folder / "r.safetensors", seven);
   EXPECT_EQ(read_recording(folder / "r.safetensors").truth, seven.truth);

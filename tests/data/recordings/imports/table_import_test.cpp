@@ -84,7 +84,7 @@ TEST_F(TableImport, ColumnsByNameMillisecondsAndPositions) {
   const Recording r = import(file(csv(50)), "time=t_ms:ms,x=px,y=py");
   ASSERT_EQ(r.frames(), 50U);
   EXPECT_DOUBLE_EQ(r.time_s[49], 0.49);
-  EXPECT_EQ(std::vector<float>(r.volts.begin() + 4, r.volts.begin() + 8),
+  EXPECT_EQ(std::vector<float>(r.signals.begin() + 4, r.signals.begin() + 8),
             (std::vector<float>{101, 200, 300, 400}));
   EXPECT_EQ(r.position_mm[2], 0.5F);
   EXPECT_EQ(r.position_mm[3], 20.0F);
@@ -97,18 +97,18 @@ TEST_F(TableImport, ColumnsByNumberRangesAndOtherSeparators) {
   for (char& c : text) c = c == ',' ? ';' : c;
   const Recording r =
       import(file("\xEF\xBB\xBF# made by hand\r\n\r\n" + text), "time=0:ms,values=4-4,values=1-3");
-  EXPECT_EQ(std::vector<float>(r.volts.begin(), r.volts.begin() + 4),
+  EXPECT_EQ(std::vector<float>(r.signals.begin(), r.signals.begin() + 4),
             (std::vector<float>{400, 100, 200, 300}));
   const std::string blanks = lines(20, " 50   60\t70 80\n");
-  EXPECT_EQ(import(file(blanks)).volts[2], 70.0F);
+  EXPECT_EQ(import(file(blanks)).signals[2], 70.0F);
   EXPECT_DOUBLE_EQ(import(file(blanks)).time_s[19], 0.19);  // the sensor's rate
 }
 
 TEST_F(TableImport, QuotesAndTrailingSeparatorsAreNoPartOfACell) {
   std::string quoted = "\"t\",\"a\",\"b\",\"c\",\"d\"\n";
   for (int i = 0; i < 30; ++i) quoted += "\"" + std::to_string(10 * i) + "\",\"50\",60,70,\"80\"\n";
-  EXPECT_EQ(import(file(quoted), "time=t:ms,values=a-d").volts[3], 80.0F);
-  EXPECT_EQ(import(file(lines(30, "50,60,70,+80,\n"))).volts[3], 80.0F);
+  EXPECT_EQ(import(file(quoted), "time=t:ms,values=a-d").signals[3], 80.0F);
+  EXPECT_EQ(import(file(lines(30, "50,60,70,+80,\n"))).signals[3], 80.0F);
 }
 
 TEST_F(TableImport, RemarksAndEmptyLinesTakeNoTime) {
@@ -121,7 +121,7 @@ TEST_F(TableImport, RemarksAndEmptyLinesTakeNoTime) {
 TEST_F(TableImport, TaxelsStandInTheSensorsOrder) {
   Sensor sensor = mat();
   sensor.order = {3, 2, 1, 0};
-  EXPECT_EQ(import(file(lines(20, "50,60,70,80\n")), "", sensor).volts[0], 80.0F);
+  EXPECT_EQ(import(file(lines(20, "50,60,70,80\n")), "", sensor).signals[0], 80.0F);
 }
 
 TEST_F(TableImport, ADriftIsTakenAwayWhereTheSensorsFileAsks) {
@@ -131,12 +131,12 @@ TEST_F(TableImport, ADriftIsTakenAwayWhereTheSensorsFileAsks) {
     text += std::to_string(40 + i / 100 + press) + ",40,40,40\n";
   }
   Sensor sensor = mat();
-  EXPECT_EQ(import(file(text), "", sensor).volts[4 * 5800], 98);
+  EXPECT_EQ(import(file(text), "", sensor).signals[4 * 5800], 98);
   sensor.follow_rest_s = 5;
   const Recording r = import(file(text), "", sensor);
-  for (const std::size_t i : {2000U, 4000U, 5800U}) EXPECT_NEAR(r.volts[4 * i], 40, 6) << i;
-  EXPECT_NEAR(r.volts[4 * 5999UL], 340, 6);
-  EXPECT_FLOAT_EQ(r.volts[4 * 5999UL + 1], 40);
+  for (const std::size_t i : {2000U, 4000U, 5800U}) EXPECT_NEAR(r.signals[4 * i], 40, 6) << i;
+  EXPECT_NEAR(r.signals[4 * 5999UL], 340, 6);
+  EXPECT_FLOAT_EQ(r.signals[4 * 5999UL + 1], 40);
 }
 
 TEST_F(TableImport, ACoarseClockIsSpread) {
@@ -206,8 +206,8 @@ TEST_F(TableImport, ImpossibleValuesAreNamed) {
 TEST_F(TableImport, NumpyArraysAndWhatTheyMayNotBe) {
   std::vector<float> values(40);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = 50 + static_cast<float>(i);
-  EXPECT_EQ(import(npy("a.npy", "<f4", "10, 4", values)).volts, values);
-  EXPECT_EQ(import(npy("a.npy", "<f4", "10, 2, 2", values)).volts, values);
+  EXPECT_EQ(import(npy("a.npy", "<f4", "10, 4", values)).signals, values);
+  EXPECT_EQ(import(npy("a.npy", "<f4", "10, 2, 2", values)).signals, values);
   Sensor row = mat();
   row.array.rows = 1, row.array.columns = 4;
   const std::string path = npy("a.npy", "<f4", "10, 2, 2", values);

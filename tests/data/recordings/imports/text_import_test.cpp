@@ -48,8 +48,8 @@ TEST(TextImport, ReadsFramesInOrder) {
   const Result result = import_text(good_lines(3));
   EXPECT_EQ(result.error, "");
   ASSERT_EQ(result.recording.frames(), 3u);
-  EXPECT_FLOAT_EQ(result.recording.volts[0], 2.0F);
-  EXPECT_FLOAT_EQ(result.recording.volts[2 * kTaxels + 5], 2.052F);
+  EXPECT_FLOAT_EQ(result.recording.signals[0], 2.0F);
+  EXPECT_FLOAT_EQ(result.recording.signals[2 * kTaxels + 5], 2.052F);
   EXPECT_EQ(result.recording.time_s, (std::vector<double>{0, 1 / rig::kFrameRateHz, 2 / rig::kFrameRateHz}));
   EXPECT_TRUE(result.recording.position_mm.empty());
   EXPECT_EQ(result.recording.metadata.at("time_base"), "nominal");
@@ -127,7 +127,7 @@ TEST(TextImport, EveryPrefixAndRandomDamageEndInARecordingOrAnError) {
     const Result result = import_text(damaged);
     const ImportReport& r = result.report;
     EXPECT_EQ(r.lines, r.frames + r.malformed() + r.non_finite + r.out_of_range + r.empty);
-    for (const float volts : result.recording.volts) ASSERT_TRUE(volts >= 0 && volts <= 3.3F);
+    for (const float volts : result.recording.signals) ASSERT_TRUE(volts >= 0 && volts <= 3.3F);
   }
 }
 

@@ -78,7 +78,7 @@ TEST(BodyFit, FindsKnownBodiesWithinTheStatedUncertainty) {
             "the fit out, and presses are simulated of bodies as different as arrays are");
 
   Recording still = simulate_touching(mat(), 10, 1);
-  for (float& signal : still.volts) signal = 40;
+  for (float& signal : still.signals) signal = 40;
   EXPECT_EQ(what_of<std::runtime_error>([&] { fitter(still); }),
             "too little was pressed: expected 100 frames or more in which a taxel shows 8 % of the range; "
             "press here "

@@ -31,8 +31,8 @@ TEST(Presses, EveryKindReachesTheWholeArrayAndBitsFollowFromTheSeed) {
     EXPECT_EQ(one.truth_width, 40);
     EXPECT_EQ(one.metadata.at("group"), kind);
     EXPECT_GT(*std::ranges::max_element(one.truth), 0.5F) << kind;
-    EXPECT_EQ(one.volts, simulate_presses(mat(), {.kind = kind, .count = 40}, 3).volts);
-    EXPECT_NE(one.volts, simulate_presses(mat(), {.kind = kind, .number = 2, .count = 40}, 3).volts);
+    EXPECT_EQ(one.signals, simulate_presses(mat(), {.kind = kind, .count = 40}, 3).signals);
+    EXPECT_NE(one.signals, simulate_presses(mat(), {.kind = kind, .number = 2, .count = 40}, 3).signals);
     felt.add(one);
   }
   EXPECT_TRUE(felt.unfelt().empty());
@@ -48,7 +48,7 @@ TEST(Presses, SignalsLieWhereTheTruthIs) {
   for (std::size_t f = 0; f < r.frames(); ++f) {
     double load = 0, x = 0, y = 0, truth = 0, tx = 0, ty = 0, edge = 0;
     for (std::size_t k = 0; k < signals; ++k) {
-      const double share = (r.volts[f * signals + k] - 40.0) / 860;
+      const double share = (r.signals[f * signals + k] - 40.0) / 860;
       load += share, x += share * static_cast<double>(k % 10), y += share * static_cast<double>(k / 10);
     }
     for (std::size_t p = 0; p < pixels; ++p) {
@@ -79,7 +79,7 @@ TEST(Presses, TheBodyDecides) {
   // A thicker skin spreads what one taxel felt.
   Sensor thick = mat();
   thick.body.skin_mm = 16;
-  const auto strongest = [](const Recording& r) { return *std::ranges::max_element(r.volts); };
+  const auto strongest = [](const Recording& r) { return *std::ranges::max_element(r.signals); };
   EXPECT_LT(strongest(simulate_presses(thick, {.kind = "bar", .count = 60}, 1)),
             strongest(simulate_presses(mat(), {.kind = "bar", .count = 60}, 1)));
 }
@@ -104,9 +104,9 @@ TEST(Presses, SurfacesHaveEverySizeAndATaxelIsTheMeanOverItsSide) {
       if (touched == 0) continue;
       ++frames, least = std::min(least, touched / 960), most = std::max(most, touched / 960);
       for (std::size_t k = 0; k < 60; ++k)
-        load += means[k], shown += (double{r.volts[f * 60 + k]} - 40) / 860;
+        load += means[k], shown += (double{r.signals[f * 60 + k]} - 40) / 860;
       for (std::size_t k = 0; k < 60; ++k) {
-        const double difference = (double{r.volts[f * 60 + k]} - 40) / 860 * load / shown - means[k];
+        const double difference = (double{r.signals[f * 60 + k]} - 40) / 860 * load / shown - means[k];
         squares += means[k] * means[k], off += difference * difference;
       }
     }
@@ -124,8 +124,8 @@ TEST(Presses, ThreeAxesLeanAndRestInTheMiddle) {
   tip.array.channels = 3;
   const Recording r = simulate_presses(tip, {.kind = "mixed", .count = 80}, 2);
   double low = 1, high = 0;
-  for (std::size_t i = 0; i < r.volts.size(); i += 3) {
-    const double share = (r.volts[i] - 40.0) / 860;
+  for (std::size_t i = 0; i < r.signals.size(); i += 3) {
+    const double share = (r.signals[i] - 40.0) / 860;
     low = std::min(low, share), high = std::max(high, share);
   }
   EXPECT_LT(low, 0.4);
@@ -148,18 +148,18 @@ TEST(FeltTaxels, NamesThoseThatASimulationNeverReached) {
   r.body = Body{.shape = BodyShape::dome, .radius_mm = 20, .knee = {}};
   r.source = "simulated";
   r.time_s = {0, 1};
-  r.volts = {0, 0, 0, 0, 0, 0, 3, 80, 9, 4, 9, 1};
+  r.signals = {0, 0, 0, 0, 0, 0, 3, 80, 9, 4, 9, 1};
   FeltTaxels felt;
   felt.add(r);
   EXPECT_EQ(felt.unfelt(), (std::vector<int>{0, 2, 3, 4, 5}));
   EXPECT_EQ(what_of<std::runtime_error>([&] { felt.check(); }),
             "5 of 6 taxels feel nothing: 0, 2-5; a network would learn that they never do. Say in the "
             "sensor's file what shape the array has, \"body\": {\"shape\": \"flat\"}, and simulate again");
-  r.volts[8] = 30;
+  r.signals[8] = 30;
   FeltTaxels third;
   third.add(r);
   EXPECT_EQ(third.complaint(), "") << "as of one slide of the rig's dome";
-  r.source = "imported", r.volts.assign(12, 0);
+  r.source = "imported", r.signals.assign(12, 0);
   FeltTaxels real;
   real.add(r);
   EXPECT_EQ(real.complaint(), "") << "a real array may not have been pressed everywhere";

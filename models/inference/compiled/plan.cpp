@@ -1,4 +1,4 @@
-#include "models/inference/prepared/plan.h"
+#include "models/inference/compiled/plan.h"
 
 #include <algorithm>
 

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "autograd/kernels/fast/isa/isa.h"
-#include "models/inference/prepared/plan.h"
+#include "models/inference/compiled/plan.h"
 
 namespace supertac {
 
@@ -14,7 +14,7 @@ namespace supertac {
 inline const kernels::IsaKernels& isa() { return kernels::isa_kernels(); }
 
 /// One step for each op, in the order in which they ran; a map's memory is reused behind its last reader.
-class Planner : TraceWalk {
+class Compiler : TraceWalk {
  public:
   /// Throws std::logic_error naming an op that has no step. `second_cache`: of the processor, in bytes; 0:
   /// not known.
@@ -27,12 +27,12 @@ class Planner : TraceWalk {
   void add_step(PlanStep step) { plan_->steps_.push_back(std::move(step)); }
 
  private:
-  using Make = void (*)(Planner&, const TracedOp&);
+  using Make = void (*)(Compiler&, const TracedOp&);
 
   static std::size_t second_cache_bytes();
   static std::size_t bytes_of(const Tensor& t) { return static_cast<std::size_t>(t.size()) * sizeof(real); }
   bool filters_anew(std::size_t second_cache) const;
-  explicit Planner(const TracedDrawing& traced);
+  explicit Compiler(const TracedPrediction& traced);
   /// In plan_steps.cpp: what makes the step of each op.
   static const std::map<std::string_view, Make>& makers();
 

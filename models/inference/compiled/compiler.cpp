@@ -1,4 +1,4 @@
-#include "models/inference/prepared/planner.h"
+#include "models/inference/compiled/compiler.h"
 
 #include <unistd.h>
 
@@ -7,7 +7,7 @@
 
 namespace supertac {
 
-std::size_t Planner::second_cache_bytes() {
+std::size_t Compiler::second_cache_bytes() {
 #ifdef _SC_LEVEL2_CACHE_SIZE
   return static_cast<std::size_t>(std::max(0L, sysconf(_SC_LEVEL2_CACHE_SIZE)));
 #else
@@ -18,31 +18,31 @@ std::size_t Planner::second_cache_bytes() {
 // A picture alone meets each weight once. Where the second cache holds all weights from one picture to the
 // next, but not their transforms too, transforming them on the way costs less than fetching them from the
 // third: .65 of the time of `paper` with 2 MB.
-bool Planner::filters_anew(std::size_t second_cache) const {
+bool Compiler::filters_anew(std::size_t second_cache) const {
   const auto maps = static_cast<std::size_t>(plan_->workspace_ + plan_->scratch_) * sizeof(real);
   return weights_ + maps <= second_cache && weights_ + transformed_ + maps > second_cache;
 }
 
-std::shared_ptr<const Plan> Planner::plan(const Network& network, std::size_t second_cache) {
-  const TracedDrawing traced(network, Tensor::zeros(network.input_shape(1)));
-  const Drawing& drawn = traced.drawn;
-  Planner planner(traced);
-  Plan& plan = *planner.plan_;
+std::shared_ptr<const Plan> Compiler::plan(const Network& network, std::size_t second_cache) {
+  const TracedPrediction traced(network, Tensor::zeros(network.input_shape(1)));
+  const Prediction& drawn = traced.drawn;
+  Compiler compiler(traced);
+  Plan& plan = *compiler.plan_;
   if (second_cache >= Plan::kLargeCache) plan.block_ = Plan::kLargeBlock;
-  plan.filters_anew_ = planner.filters_anew(second_cache);
-  plan.picture_ = planner.map_of(drawn.picture);
-  if (drawn.predicted_error.defined()) plan.predicted_error_ = planner.map_of(drawn.predicted_error);
-  if (drawn.latents.defined()) plan.latents_ = planner.map_of(drawn.latents);
-  return planner.plan_;
+  plan.filters_anew_ = compiler.filters_anew(second_cache);
+  plan.picture_ = compiler.map_of(drawn.picture);
+  if (drawn.predicted_error.defined()) plan.predicted_error_ = compiler.map_of(drawn.predicted_error);
+  if (drawn.latents.defined()) plan.latents_ = compiler.map_of(drawn.latents);
+  return compiler.plan_;
 }
 
-Planner::Planner(const TracedDrawing& traced) : TraceWalk(traced) {
+Compiler::Compiler(const TracedPrediction& traced) : TraceWalk(traced) {
   const std::vector<TracedOp>& ops = traced.trace.ops();
   for (std::size_t i = 0; i < ops.size(); ++i) {
     const auto make = makers().find(ops[i].op);
     if (make == makers().end())
-      throw std::logic_error("Prepared: no step computes the op " + std::string(ops[i].op) +
-                             "; models/inference/prepared/plan_steps.cpp lists those that have one");
+      throw std::logic_error("CompiledModel: no step computes the op " + std::string(ops[i].op) +
+                             "; models/inference/compiled/plan_steps.cpp lists those that have one");
     takes_input(ops[i]);  // or throws
     make->second(*this, ops[i]);
     if (maps_.contains(ops[i].y.node()))
@@ -51,7 +51,7 @@ Planner::Planner(const TracedDrawing& traced) : TraceWalk(traced) {
   }
 }
 
-const FeatureMap& Planner::map_of(const Variable& x) const { return maps_.at(owner(x)); }
+const FeatureMap& Compiler::map_of(const Variable& x) const { return maps_.at(owner(x)); }
 
 static FeatureMap append(FeatureMap map, std::vector<FeatureMap>& all, Dim& size) {
   constexpr Dim kLine = 64;  // a line of the cache in bytes
@@ -74,11 +74,11 @@ static FeatureMap take(FeatureMap map, std::vector<FeatureMap>& free, std::vecto
   return map;
 }
 
-const FeatureMap& Planner::new_map(const Variable& y) {
+const FeatureMap& Compiler::new_map(const Variable& y) {
   return maps_[y.node()] = take(layout_of(y), free_, plan_->buffers_, plan_->workspace_);
 }
 
-void Planner::release_after(std::size_t op) {
+void Compiler::release_after(std::size_t op) {
   std::erase_if(maps_, [&](const auto& value) {
     if (read_after(value.first, op)) return false;
     free_.push_back(value.second);

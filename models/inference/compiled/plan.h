@@ -1,4 +1,4 @@
-// The steps of a prepared network and the memory that they work on.
+// The steps of a compiled model and the memory that they work on.
 #pragma once
 
 #include <functional>
@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "autograd/kernels/fast/inference.h"
-#include "models/inference/prepared/prepared.h"
-#include "models/inference/prepared/taps.h"
+#include "models/inference/compiled/compiled_model.h"
+#include "models/inference/compiled/taps.h"
 #include "models/networks/network.h"
 
 namespace supertac {
@@ -35,7 +35,7 @@ class Plan {
   bool filters_anew() const { return filters_anew_; }
 
  private:
-  friend class Planner;
+  friend class Compiler;
   FeatureMap add_buffer(FeatureMap layout);
   void clear_margins(const Block& block) const;
   void show(const StepWatch& watch, const Block& block, std::size_t steps_done) const;

@@ -1,4 +1,4 @@
-#include "models/inference/prepared/taps.h"
+#include "models/inference/compiled/taps.h"
 
 #include <algorithm>
 #include <limits>
@@ -109,7 +109,7 @@ InputRuns InputRuns::of(const TracedOp& op) {
   return {(op.inputs[0].size() - op.y.size()) / op.y.dim(0), channels, 0, channels};
 }
 
-TraceWalk::TraceWalk(const TracedDrawing& traced) : input_(traced.input.node()) {
+TraceWalk::TraceWalk(const TracedPrediction& traced) : input_(traced.input.node()) {
   const std::vector<TracedOp>& ops = traced.trace.ops();
   for (std::size_t i = 0; i < ops.size(); ++i) {
     const TracedOp& op = ops[i];
@@ -144,7 +144,8 @@ std::vector<ProductTaps> TraceWalk::products_of(const TracedOp& op, const Featur
 }
 
 ProductTaps TraceWalk::linear(const TracedOp& op, const FeatureMap& x, const FeatureMap& y) const {
-  if (x.height > 1 && x.margin_w > 0) throw std::logic_error("Prepared: a flattened picture has margins");
+  if (x.height > 1 && x.margin_w > 0)
+    throw std::logic_error("CompiledModel: a flattened picture has margins");
   const auto unflattened = pixels_of_unflatten_.find(op.y.node());
   const Dim pixels = unflattened == pixels_of_unflatten_.end() ? 1 : unflattened->second;
   const Dim in = op.inputs[0].dim(1), out = op.y.dim(1);
@@ -165,7 +166,7 @@ bool TraceWalk::read_after(Id value, std::size_t op) const {
 bool TraceWalk::takes_input(const TracedOp& op) const {
   const bool takes = op.op == "take_runs" || op.op == "last_frame";
   if (takes != (op.inputs[0].node() == input_))
-    throw std::logic_error("Prepared: " + std::string(op.op) + " has a step for " +
+    throw std::logic_error("CompiledModel: " + std::string(op.op) + " has a step for " +
                            (takes ? "the network's input only" : "anything but the network's input"));
   return takes;
 }

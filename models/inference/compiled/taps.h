@@ -74,7 +74,7 @@ class TraceWalk {
  protected:
   using Id = const detail::Node*;
 
-  explicit TraceWalk(const TracedDrawing& traced);
+  explicit TraceWalk(const TracedPrediction& traced);
 
   /// The value itself, or the map that it is the flattened form of.
   Id owner(const Variable& x) const;

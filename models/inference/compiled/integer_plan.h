@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "models/inference/prepared/prepared.h"
-#include "models/inference/prepared/quantise.h"
-#include "models/inference/prepared/ranges.h"
-#include "models/inference/prepared/taps.h"
+#include "models/inference/compiled/compiled_model.h"
+#include "models/inference/compiled/quantise.h"
+#include "models/inference/compiled/ranges.h"
+#include "models/inference/compiled/taps.h"
 #include "models/networks/network.h"
 
 namespace supertac {

@@ -1,4 +1,4 @@
-#include "models/inference/prepared/prepared.h"
+#include "models/inference/compiled/compiled_model.h"
 
 #include <gtest/gtest.h>
 #include <omp.h>
@@ -16,7 +16,7 @@
 #include "io/files/safetensors.h"
 #include "io/numbers/random.h"
 #include "layers/convolution.h"
-#include "models/inference/prepared/planner.h"
+#include "models/inference/compiled/compiler.h"
 #include "tests/expect_error.h"
 #include "tests/models/support.h"
 
@@ -41,10 +41,10 @@ void expect_close(const Tensor& a, const Tensor& b, const std::string& what) {
 
 void expect_same_estimate(const Network& network, Dim count, const std::string& what) {
   const Tensor inputs = uniform(network.input_shape(count), 7);
-  const Estimate forward = network.estimate(inputs), prepared = Prepared(network).estimate(inputs);
-  expect_close(forward.picture, prepared.picture, what + " picture");
-  expect_close(forward.predicted_error, prepared.predicted_error, what + " predicted_error");
-  expect_close(forward.latents, prepared.latents, what + " latents");
+  const Estimate forward = network.estimate(inputs), compiled = CompiledModel(network).estimate(inputs);
+  expect_close(forward.picture, compiled.picture, what + " picture");
+  expect_close(forward.predicted_error, compiled.predicted_error, what + " predicted_error");
+  expect_close(forward.latents, compiled.latents, what + " latents");
 }
 
 SuperTacSettings random_settings(std::uint64_t seed) {
@@ -68,7 +68,7 @@ SuperTacSettings random_settings(std::uint64_t seed) {
   return s;
 }
 
-TEST(Prepared, DrawsWhatTheNetworkDrawsForAnySettings) {
+TEST(CompiledModel, DrawsWhatTheNetworkDrawsForAnySettings) {
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
     const SuperTacSettings s = random_settings(seed);
     expect_same_estimate(random_network(s, seed), 1 + static_cast<Dim>(seed % 10),
@@ -77,7 +77,7 @@ TEST(Prepared, DrawsWhatTheNetworkDrawsForAnySettings) {
   }
 }
 
-TEST(Prepared, DrawsWhatTheNetworkDrawsForPresets) {
+TEST(CompiledModel, DrawsWhatTheNetworkDrawsForPresets) {
   for (const char* preset : {"paper", "tiny", "frame"})
     expect_same_estimate(random_network(SuperTacSettings::of_preset(preset)), 9, preset);
 }
@@ -91,7 +91,7 @@ class Odd : public Network {
   Shape input_shape(Dim count) const override {
     return kind_ == convolves_input ? Shape{count, 4, 6, 2} : Shape{count, 1, 48};
   }
-  Drawing draw(const Variable& x) const override {
+  Prediction draw(const Variable& x) const override {
     if (kind_ == convolves_input) return {a_.forward(x), {}, {}};
     const Variable frame = last_frame(x, 4, 6, 2), maps[] = {a_.forward(frame), a_.forward(frame, kRelu)};
     if (kind_ == joins_maps) return {concat(maps), {}, {}};
@@ -105,21 +105,22 @@ class Odd : public Network {
   Conv2d a_;
 };
 
-TEST(Prepared, RefusesWhatNoNetworkOfOursDoes) {
+TEST(CompiledModel, RefusesWhatNoNetworkOfOursDoes) {
   const std::pair<Odd::Kind, const char*> refused[] = {
-      {Odd::joins_maps, "Prepared: a concat of maps has no step"},
-      {Odd::convolves_input, "Prepared: conv2d has a step for anything but the network's input"},
-      {Odd::takes_runs, "Prepared: take_runs has a step for the network's input only"},
+      {Odd::joins_maps, "CompiledModel: a concat of maps has no step"},
+      {Odd::convolves_input, "CompiledModel: conv2d has a step for anything but the network's input"},
+      {Odd::takes_runs, "CompiledModel: take_runs has a step for the network's input only"},
       {Odd::pools,
-       "Prepared: no step computes the op max_pool2d; models/inference/prepared/plan_steps.cpp lists those "
+       "CompiledModel: no step computes the op max_pool2d; models/inference/compiled/plan_steps.cpp lists "
+       "those "
        "that "
        "have one"}};
   for (const auto& [kind, text] : refused)
-    EXPECT_EQ(what_of<std::logic_error>([&kind = kind] { const Prepared p{Odd(kind)}; }), text);
+    EXPECT_EQ(what_of<std::logic_error>([&kind = kind] { const CompiledModel p{Odd(kind)}; }), text);
 }
 
 // All pictures of 64 windows, `batch` at a time.
-Tensor in_batches(const Prepared& network, const Tensor& windows, Dim batch) {
+Tensor in_batches(const CompiledModel& network, const Tensor& windows, Dim batch) {
   Tensor all(network.network().picture_shape(windows.dim(0)));
   const Dim size = windows.size() / windows.dim(0), pixels = all.size() / windows.dim(0);
   for (Dim first = 0; first < windows.dim(0); first += batch) {
@@ -133,16 +134,16 @@ Tensor in_batches(const Prepared& network, const Tensor& windows, Dim batch) {
   return all;
 }
 
-Prepared prepare(const Network& network, bool bytes) {
-  if (!bytes) return Prepared(network);
+CompiledModel prepare(const Network& network, bool bytes) {
+  if (!bytes) return CompiledModel(network);
   ActivationRanges ranges;
   ranges.add(network, uniform(network.input_shape(16), 5));
-  return Prepared(network, ranges);
+  return CompiledModel(network, ranges);
 }
 
-class PreparedBits : public testing::TestWithParam<std::tuple<const char*, bool>> {};
+class CompiledBits : public testing::TestWithParam<std::tuple<const char*, bool>> {};
 
-TEST_P(PreparedBits, AreOneForBatchesInstructionSetsAndThreads) {
+TEST_P(CompiledBits, AreOneForBatchesInstructionSetsAndThreads) {
   const auto [preset, bytes] = GetParam();
   const SuperTac network = random_network(SuperTacSettings::of_preset(preset), 3);
   const Tensor windows = uniform(network.input_shape(64), 1);
@@ -151,11 +152,11 @@ TEST_P(PreparedBits, AreOneForBatchesInstructionSetsAndThreads) {
   for (const kernels::IsaKernels* set : supported_sets()) {
     if (set == &kernels::kPlainKernels || set == &kernels::kPortableKernels) continue;  // far slower
     use_isa(*set);
-    const Prepared prepared = prepare(network, bytes);
+    const CompiledModel compiled = prepare(network, bytes);
     for (const Dim batch : {1, 7, 8, 64}) {
       for (const int threads : {1, 2, 4}) {
         omp_set_num_threads(threads);
-        EXPECT_TRUE(std::ranges::equal(expected.values(), in_batches(prepared, windows, batch).values()))
+        EXPECT_TRUE(std::ranges::equal(expected.values(), in_batches(compiled, windows, batch).values()))
             << preset << " " << set->name << ", batch " << batch << ", threads " << threads;
       }
     }
@@ -164,19 +165,19 @@ TEST_P(PreparedBits, AreOneForBatchesInstructionSetsAndThreads) {
   omp_set_num_threads(1);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, PreparedBits,
+INSTANTIATE_TEST_SUITE_P(All, CompiledBits,
                          testing::Combine(testing::Values("paper", "tiny"), testing::Bool()));
 
 // On the second cache depend how many pictures are drawn at once and whether few have their filters
 // transformed on the way.
-TEST(Prepared, OfAnyCacheHasTheSameBits) {
+TEST(CompiledModel, OfAnyCacheHasTheSameBits) {
   const SuperTac network = random_network(SuperTacSettings::of_preset("paper"), 4);
   std::set<bool> seen;
   for (const Dim count : {1, 2, 3, 17}) {
     const Tensor windows = uniform(network.input_shape(count), 6);
-    const Estimate expected = Planner::plan(network, 0)->run(windows);
+    const Estimate expected = Compiler::plan(network, 0)->run(windows);
     for (const std::size_t megabytes : {1, 2, 3, 4, 64}) {
-      const auto plan = Planner::plan(network, megabytes << 20);
+      const auto plan = Compiler::plan(network, megabytes << 20);
       seen.insert(plan->filters_anew());
       const Estimate found = plan->run(windows);
       EXPECT_TRUE(std::ranges::equal(expected.picture.values(), found.picture.values()))
@@ -188,7 +189,7 @@ TEST(Prepared, OfAnyCacheHasTheSameBits) {
   EXPECT_EQ(seen.size(), 2U);
 }
 
-TEST(Prepared, InBytesDrawsNearlyTheSame) {
+TEST(CompiledModel, InBytesDrawsNearlyTheSame) {
   for (std::uint64_t seed = 0; seed < 12; ++seed) {
     const SuperTac network = random_network(random_settings(seed), seed);
     const Tensor inputs = uniform(network.input_shape(9), 5);
@@ -200,21 +201,21 @@ TEST(Prepared, InBytesDrawsNearlyTheSame) {
 }
 
 // Each op's map, in the order of the ops; a linear layer before a map leaves its numbers pixel by pixel.
-TEST(Prepared, ShowsEveryMapOnItsWay) {
+TEST(CompiledModel, ShowsEveryMapOnItsWay) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     const SuperTac network = random_network(random_settings(seed), seed);
     const Tensor input = uniform(network.input_shape(1), 5);
     std::vector<std::pair<std::string, std::vector<real>>> ops, shown;
     const auto numbers = [](const Tensor& t) { return std::vector(t.values().begin(), t.values().end()); };
     {
-      const TracedDrawing traced(network, input);
+      const TracedPrediction traced(network, input);
       for (const TracedOp& op : traced.trace.ops())
         if (op.op != "flatten_channels_first") ops.emplace_back(op.op, numbers(op.y.value()));
     }
-    const Prepared prepared(network);
-    const Estimate drawn = prepared.watched(
+    const CompiledModel compiled(network);
+    const Estimate drawn = compiled.watched(
         input, [&](const std::string& step, const Tensor& map) { shown.emplace_back(step, numbers(map)); });
-    EXPECT_TRUE(std::ranges::equal(drawn.picture.values(), prepared.estimate(input).picture.values()));
+    EXPECT_TRUE(std::ranges::equal(drawn.picture.values(), compiled.estimate(input).picture.values()));
     ASSERT_EQ(ops.size(), shown.size());
     for (std::size_t i = 0; i < ops.size(); ++i) {
       EXPECT_EQ(ops[i].first, shown[i].first);
@@ -227,7 +228,7 @@ TEST(Prepared, ShowsEveryMapOnItsWay) {
   }
 }
 
-TEST(Prepared, InBytesShowsItsMapsAsWhatTheyStandFor) {
+TEST(CompiledModel, InBytesShowsItsMapsAsWhatTheyStandFor) {
   const SuperTac network =
       random_network({.timesteps = 32, .latent = 3, .scale = 4, .channels = 8, .rcabs = 1});
   const Tensor input = uniform(network.input_shape(1), 5);
@@ -237,14 +238,14 @@ TEST(Prepared, InBytesShowsItsMapsAsWhatTheyStandFor) {
       maps[step] = std::vector(map.values().begin(), map.values().end());
     };
   };
-  const Prepared in_bytes = prepare(network, true);
+  const CompiledModel in_bytes = prepare(network, true);
   const Estimate drawn = in_bytes.watched(input, into(bytes));
   EXPECT_TRUE(std::ranges::equal(bytes.at("upsampler.out"), drawn.picture.values()));
   EXPECT_TRUE(std::ranges::equal(in_bytes.estimate(input).picture.values(), drawn.picture.values()));
   std::map<const void*, std::string> names;
   for (const Parameter& p : network.parameters()) names[p.value.node()] = p.name;
   std::size_t compared = 0;
-  const TracedDrawing traced(network, input);
+  const TracedPrediction traced(network, input);
   for (const TracedOp& op : traced.trace.ops()) {
     std::string layer = op.inputs.size() < 2 ? "" : names[op.inputs[1].node()];
     layer = layer.substr(0, layer.rfind('.'));
@@ -260,16 +261,16 @@ TEST(Prepared, InBytesShowsItsMapsAsWhatTheyStandFor) {
   for (const real gate : bytes.at("sigmoid")) EXPECT_TRUE(gate > 0.2F && gate < 0.8F) << gate;
   EXPECT_EQ(what_of<std::invalid_argument>(
                 [&] { in_bytes.watched(uniform(network.input_shape(2), 5), into(bytes)); }),
-            "Prepared: one window is watched, got [2,32,16]");
+            "CompiledModel: one window is watched, got [2,32,16]");
 }
 
-TEST(Prepared, RefusesTheRangesOfAnotherNetwork) {
+TEST(CompiledModel, RefusesTheRangesOfAnotherNetwork) {
   const SuperTac network = random_network();
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Prepared(network, ActivationRanges()); }),
-            "Prepared: the ranges are those of 0 ops, the network has 46");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { CompiledModel(network, ActivationRanges()); }),
+            "CompiledModel: the ranges are those of 0 ops, the network has 46");
 }
 
-TEST(Prepared, RefusesRangesThatAreNotFiniteOrNoPairs) {
+TEST(CompiledModel, RefusesRangesThatAreNotFiniteOrNoPairs) {
   const TemporaryFolder folder;
   const auto read = [&](float high) {
     const std::array<float, 4> ranges{0, 1, -1, high};  // write_checkpoint() would refuse the same itself
@@ -289,13 +290,13 @@ TEST(Prepared, RefusesRangesThatAreNotFiniteOrNoPairs) {
             "m: int8.ranges expected F32 [N,2], found F32 [4]");
 }
 
-TEST(Prepared, RefusesInputsOfAnotherShape) {
+TEST(CompiledModel, RefusesInputsOfAnotherShape) {
   const SuperTac network = random_network();
   EXPECT_EQ(what_of<std::invalid_argument>([&] {
-              Prepared(network).estimate(Tensor::zeros({1, 3, 16}));
+              CompiledModel(network).estimate(Tensor::zeros({1, 3, 16}));
             }),
-            "Prepared: inputs expects [0,32,16] with any first size, got [1,3,16]");
-  EXPECT_EQ(Prepared(network).estimate(Tensor::zeros(network.input_shape(0))).picture.dim(0), 0);
+            "CompiledModel: inputs expects [0,32,16] with any first size, got [1,3,16]");
+  EXPECT_EQ(CompiledModel(network).estimate(Tensor::zeros(network.input_shape(0))).picture.dim(0), 0);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "models/inference/prepared/quantise.h"
+#include "models/inference/compiled/quantise.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
-// The steps of models/inference/prepared/planner.h that are products in Winograd's domain: 3x3 convolutions
+// The steps of models/inference/compiled/compiler.h that are products in Winograd's domain: 3x3 convolutions
 // that keep the size of a map, and transposed 4x4 ones that double it.
 #include <algorithm>
 
-#include "models/inference/prepared/planner.h"
+#include "models/inference/compiled/compiler.h"
 
 namespace supertac {
 
@@ -135,7 +135,7 @@ std::vector<Dim> quarter_taps(Dim top, Dim left, Dim size) {
 
 }  // namespace
 
-void Planner::conv(const TracedOp& op) {
+void Compiler::conv(const TracedOp& op) {
   const ConvSettings& s = op.settings.conv;
   const bool same =
       s ==
@@ -146,7 +146,7 @@ void Planner::conv(const TracedOp& op) {
   product(op);
 }
 
-void Planner::transposed_conv(const TracedOp& op) {
+void Compiler::transposed_conv(const TracedOp& op) {
   const ConvSettings& s = op.settings.conv;
   const bool doubles = s == ConvSettings{.height = s.height,
                                          .width = s.width,
@@ -161,7 +161,7 @@ void Planner::transposed_conv(const TracedOp& op) {
   product(op);
 }
 
-void Planner::add_winograd(Winograd step) {
+void Compiler::add_winograd(Winograd step) {
   const bool either = step.can_transform_anew();
   if (!either) step.w = {};
   if (either) weights_ += bytes_of(step.w);
@@ -170,7 +170,7 @@ void Planner::add_winograd(Winograd step) {
   add_step(std::move(step));
 }
 
-void Planner::winograd(const TracedOp& op) {
+void Compiler::winograd(const TracedOp& op) {
   const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   Winograd step = winograd_step(op, x, y, y.strides());
   Filters all;
@@ -182,7 +182,7 @@ void Planner::winograd(const TracedOp& op) {
 // Each quarter of the outputs is a convolution with two by two of the three by three inputs around. The first
 // point of Winograd's transform, 0, sees the first tap alone and the last, infinity, the last one: where
 // these are 0, so is a row or a column of places.
-void Planner::transposed_winograd(const TracedOp& op) {
+void Compiler::transposed_winograd(const TracedOp& op) {
   const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   Winograd step = winograd_step(op, x, y, {y.image(), 2 * y.line(), 2 * y.channels});
   constexpr Taps kTaps[] = {Taps::first_two, Taps::last_two};

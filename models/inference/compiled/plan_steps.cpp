@@ -5,7 +5,7 @@
 
 #include "autograd/kernels/exp.h"
 #include "autograd/kernels/fast/each.h"
-#include "models/inference/prepared/planner.h"
+#include "models/inference/compiled/compiler.h"
 
 namespace supertac {
 
@@ -14,12 +14,12 @@ static void copy_runs(Dim rows, const real* from, Dim from_step, real* to, Dim t
   for (Dim r = 0; r < rows; ++r, from += from_step, to += to_step) std::copy_n(from, kRun, to);
 }
 
-static void input_step(Planner& planner, const TracedOp& op) {
-  const FeatureMap y = planner.new_map(op.y);
+static void input_step(Compiler& compiler, const TracedOp& op) {
+  const FeatureMap y = compiler.new_map(op.y);
   const Dim size = op.inputs[0].size() / op.inputs[0].dim(0);
   const InputRuns runs = InputRuns::of(op);
   const Dim piece = runs.run % 4 == 0 ? 4 : 1;  // a row of the rig's array is one move
-  planner.add_step([=](const Block& b) {
+  compiler.add_step([=](const Block& b) {
     for (Dim n = 0; n < b.images; ++n) {
       const real* from = b.input + n * size + runs.first;
       real* line = b.first_pixel(y) + n * y.image();
@@ -69,7 +69,7 @@ struct PlaneConvs {
   static constexpr std::size_t kMost = 2;  // picture and predicted error
 };
 
-void Planner::plane_conv(const TracedOp& op) {
+void Compiler::plane_conv(const TracedOp& op) {
   const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   PlaneConvs::Output output{{}, plane_weights(op.inputs[1]), y};
   output.to = {output.w.data(), op.inputs[2].value().data()[0], op.settings.negative_slope};
@@ -103,7 +103,7 @@ struct Product {
   }
 };
 
-void Planner::product(const TracedOp& op) {
+void Compiler::product(const TracedOp& op) {
   const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   for (ProductTaps& taps : products_of(op, x, y)) {
     weights_ += bytes_of(taps.w);
@@ -118,9 +118,9 @@ void Planner::product(const TracedOp& op) {
   }
 }
 
-static void unflatten_step(Planner& planner, const TracedOp& op) {
-  const FeatureMap x = planner.map_of(op.inputs[0]), y = planner.new_map(op.y);
-  planner.add_step([=](const Block& b) {
+static void unflatten_step(Compiler& compiler, const TracedOp& op) {
+  const FeatureMap x = compiler.map_of(op.inputs[0]), y = compiler.new_map(op.y);
+  compiler.add_step([=](const Block& b) {
     const Dim run = y.width * y.channels;
     for (Dim n = 0; n < b.images; ++n) {
       const real* from = b.begin(x) + n * x.image();
@@ -130,13 +130,13 @@ static void unflatten_step(Planner& planner, const TracedOp& op) {
   });
 }
 
-static void concat_step(Planner& planner, const TracedOp& op) {
-  if (op.y.rank() > 2) throw std::logic_error("Prepared: a concat of maps has no step");
-  const FeatureMap y = planner.new_map(op.y);
+static void concat_step(Compiler& compiler, const TracedOp& op) {
+  if (op.y.rank() > 2) throw std::logic_error("CompiledModel: a concat of maps has no step");
+  const FeatureMap y = compiler.new_map(op.y);
   Dim at = 0;
   for (const Variable& input : op.inputs) {
-    const FeatureMap x = planner.map_of(input);
-    planner.add_step([=](const Block& b) {
+    const FeatureMap x = compiler.map_of(input);
+    compiler.add_step([=](const Block& b) {
       for (Dim n = 0; n < b.images; ++n)
         std::copy_n(b.begin(x) + n * x.channels, x.channels, b.begin(y) + n * y.channels + at);
     });
@@ -144,17 +144,17 @@ static void concat_step(Planner& planner, const TracedOp& op) {
   }
 }
 
-static void global_mean_step(Planner& planner, const TracedOp& op) {
-  const FeatureMap x = planner.map_of(op.inputs[0]), y = planner.new_map(op.y);
-  planner.add_step([=](const Block& b) {
+static void global_mean_step(Compiler& compiler, const TracedOp& op) {
+  const FeatureMap x = compiler.map_of(op.inputs[0]), y = compiler.new_map(op.y);
+  compiler.add_step([=](const Block& b) {
     isa().mean({b.images, x.height, x.width, x.channels, {}, x.strides(), {}}, b.first_pixel(x), b.begin(y));
   });
 }
 
-static void sigmoid_step(Planner& planner, const TracedOp& op) {
-  const FeatureMap x = planner.map_of(op.inputs[0]), y = planner.new_map(op.y);
-  if (op.y.rank() > 2) throw std::logic_error("Prepared: a sigmoid of maps has no step");
-  planner.add_step([=](const Block& b) {
+static void sigmoid_step(Compiler& compiler, const TracedOp& op) {
+  const FeatureMap x = compiler.map_of(op.inputs[0]), y = compiler.new_map(op.y);
+  if (op.y.rank() > 2) throw std::logic_error("CompiledModel: a sigmoid of maps has no step");
+  compiler.add_step([=](const Block& b) {
     kernels::each(b.images * x.image(), [from = b.begin(x), to = b.begin(y)](Dim i) {
       to[i] = kernels::sigmoid_same_bits(from[i]);
     });
@@ -162,27 +162,27 @@ static void sigmoid_step(Planner& planner, const TracedOp& op) {
 }
 
 // a + gates * x, or a + x.
-static void sum_step(Planner& planner, const TracedOp& op) {
-  const FeatureMap a = planner.map_of(op.inputs[0]), x = planner.map_of(op.inputs[1]);
+static void sum_step(Compiler& compiler, const TracedOp& op) {
+  const FeatureMap a = compiler.map_of(op.inputs[0]), x = compiler.map_of(op.inputs[1]);
   const bool gated = op.inputs.size() == 3;
-  const FeatureMap gates = gated ? planner.map_of(op.inputs[2]) : FeatureMap();
-  const FeatureMap y = planner.new_map(op.y);
-  planner.add_step([=](const Block& b) {
+  const FeatureMap gates = gated ? compiler.map_of(op.inputs[2]) : FeatureMap();
+  const FeatureMap y = compiler.new_map(op.y);
+  compiler.add_step([=](const Block& b) {
     isa().gate({b.images, x.height, x.width, x.channels, a.strides(), x.strides(), y.strides()},
                b.first_pixel(a), b.first_pixel(x), gated ? b.begin(gates) : nullptr, b.first_pixel(y));
   });
 }
 
-const std::map<std::string_view, Planner::Make>& Planner::makers() {
+const std::map<std::string_view, Compiler::Make>& Compiler::makers() {
   static const std::map<std::string_view, Make> known{
       {"take_runs", input_step},
       {"last_frame", input_step},
-      {"conv1d", [](Planner& planner, const TracedOp& op) { planner.conv(op); }},
-      {"conv2d", [](Planner& planner, const TracedOp& op) { planner.conv(op); }},
-      {"conv_transpose1d", [](Planner& planner, const TracedOp& op) { planner.transposed_conv(op); }},
-      {"conv_transpose2d", [](Planner& planner, const TracedOp& op) { planner.transposed_conv(op); }},
-      {"linear", [](Planner& planner, const TracedOp& op) { planner.product(op); }},
-      {"flatten_channels_first", [](Planner&, const TracedOp&) {}},  // a linear layer takes the map as it is
+      {"conv1d", [](Compiler& compiler, const TracedOp& op) { compiler.conv(op); }},
+      {"conv2d", [](Compiler& compiler, const TracedOp& op) { compiler.conv(op); }},
+      {"conv_transpose1d", [](Compiler& compiler, const TracedOp& op) { compiler.transposed_conv(op); }},
+      {"conv_transpose2d", [](Compiler& compiler, const TracedOp& op) { compiler.transposed_conv(op); }},
+      {"linear", [](Compiler& compiler, const TracedOp& op) { compiler.product(op); }},
+      {"flatten_channels_first", [](Compiler&, const TracedOp&) {}},  // a linear layer takes the map as it is
       {"unflatten_channels_first", unflatten_step},
       {"concat", concat_step},
       {"global_mean", global_mean_step},

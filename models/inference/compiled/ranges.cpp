@@ -1,4 +1,4 @@
-#include "models/inference/prepared/ranges.h"
+#include "models/inference/compiled/ranges.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@ namespace supertac {
 static const std::string kName = "int8.ranges";
 
 void ActivationRanges::add(const Network& network, const Tensor& inputs) {
-  const TracedDrawing traced(network, inputs);
+  const TracedPrediction traced(network, inputs);
   const std::vector<TracedOp>& ops = traced.trace.ops();
   if (low_.empty()) low_.resize(ops.size(), 0), high_ = low_;
   if (low_.size() != ops.size())

@@ -1,5 +1,5 @@
 // From what an inference was seen to do (autograd/trace.h) to the steps of
-// models/inference/prepared/integer_plan.h.
+// models/inference/compiled/integer_plan.h.
 //
 // A value lies in memory as bytes, as numbers (int16) or as both, by who reads it:
 //
@@ -14,7 +14,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "models/inference/prepared/integer_plan.h"
+#include "models/inference/compiled/integer_plan.h"
 
 namespace supertac {
 namespace {
@@ -22,9 +22,9 @@ namespace {
 using Kind = IntegerStep::Kind;
 constexpr Dim kFour = 4;  // bytes, and outputs, that kernels.c multiplies together
 
-class IntegerPlanner : TraceWalk {
+class IntegerCompiler : TraceWalk {
  public:
-  IntegerPlanner(const Network& network, const ActivationRanges& ranges, const TracedDrawing& traced);
+  IntegerCompiler(const Network& network, const ActivationRanges& ranges, const TracedPrediction& traced);
   std::shared_ptr<IntegerPlan> plan() { return std::move(plan_); }
 
  private:
@@ -54,13 +54,13 @@ class IntegerPlanner : TraceWalk {
   std::map<int, Id> value_of_;
 };
 
-IntegerPlanner::IntegerPlanner(const Network& network, const ActivationRanges& ranges,
-                               const TracedDrawing& traced)
+IntegerCompiler::IntegerCompiler(const Network& network, const ActivationRanges& ranges,
+                                 const TracedPrediction& traced)
     : TraceWalk(traced) {
   const std::vector<TracedOp>& ops = traced.trace.ops();
-  const Drawing& drawn = traced.drawn;
+  const Prediction& drawn = traced.drawn;
   if (ranges.ops() != ops.size())
-    throw std::invalid_argument("Prepared: the ranges are those of " + std::to_string(ranges.ops()) +
+    throw std::invalid_argument("CompiledModel: the ranges are those of " + std::to_string(ranges.ops()) +
                                 " ops, the network has " + std::to_string(ops.size()));
   for (const Parameter& p : network.parameters())
     layers_[p.value.node()] = p.name.substr(0, p.name.rfind('.'));
@@ -83,7 +83,7 @@ IntegerPlanner::IntegerPlanner(const Network& network, const ActivationRanges& r
 }
 
 // Twice the largest number fits; sums of residual blocks may be larger than they were seen to be.
-void IntegerPlanner::choose_fraction_bits(const std::vector<TracedOp>& ops, const ActivationRanges& ranges) {
+void IntegerCompiler::choose_fraction_bits(const std::vector<TracedOp>& ops, const ActivationRanges& ranges) {
   constexpr double kRoom = 16384;
   double largest = 1;
   for (std::size_t i = 0; i < ops.size(); ++i)
@@ -93,7 +93,7 @@ void IntegerPlanner::choose_fraction_bits(const std::vector<TracedOp>& ops, cons
 
 // Where whole quads of channels meet enough outputs to repay the way into bytes and back. The picture's own
 // convolution reads numbers: measured, rounding its input costs the most (bench/results).
-bool IntegerPlanner::is_of_bytes(const TracedOp& op) const {
+bool IntegerCompiler::is_of_bytes(const TracedOp& op) const {
   if (!scales_.contains(owner(op.inputs[0]))) return false;
   if (op.op == "linear") return owner(op.inputs[0]) != op.inputs[0].node();
   return op.op.starts_with("conv") && op.inputs[0].dim(op.inputs[0].rank() - 1) % kFour == 0 &&
@@ -101,7 +101,7 @@ bool IntegerPlanner::is_of_bytes(const TracedOp& op) const {
 }
 
 // In the first gap between the maps that are still read.
-int IntegerPlanner::new_map(const Variable& y, bool bytes) {
+int IntegerCompiler::new_map(const Variable& y, bool bytes) {
   constexpr Dim kLine = 64;  // of the cache, in bytes
   IntegerMap m{layout_of(y), bytes, bytes ? scales_.at(y.node()) : Scale{plan_->number_step(), 0, 32768}};
   const auto rounded = [](Dim size) { return (size + kLine - 1) / kLine * kLine; };
@@ -121,11 +121,11 @@ int IntegerPlanner::new_map(const Variable& y, bool bytes) {
   return index;
 }
 
-void IntegerPlanner::release(std::size_t op) {
+void IntegerCompiler::release(std::size_t op) {
   std::erase_if(live_, [&](int i) { return !read_after(value_of_.at(i), op); });
 }
 
-IntegerStep& IntegerPlanner::add(Kind kind, std::string name, int x, int y) {
+IntegerStep& IntegerCompiler::add(Kind kind, std::string name, int x, int y) {
   IntegerStep step;
   step.kind = kind, step.name = std::move(name), step.x = x, step.y = y;
   step.writes_margin = written_.insert(y).second && map(y).margin_h + map(y).margin_w > 0;
@@ -133,12 +133,12 @@ IntegerStep& IntegerPlanner::add(Kind kind, std::string name, int x, int y) {
   return plan_->steps.back();
 }
 
-std::string IntegerPlanner::layer_of(const TracedOp& op) const {
+std::string IntegerCompiler::layer_of(const TracedOp& op) const {
   const auto found = op.inputs.size() > 1 ? layers_.find(op.inputs[1].node()) : layers_.end();
   return found == layers_.end() ? std::string(op.op) : found->second;
 }
 
-void IntegerPlanner::make(const TracedOp& op) {
+void IntegerCompiler::make(const TracedOp& op) {
   if (op.op == "flatten_channels_first") return;  // the linear layer behind it takes the map as it is
   if (takes_input(op)) return take_input(op);
   const bool product = op.op.starts_with("conv") || op.op == "linear";
@@ -164,18 +164,18 @@ void IntegerPlanner::make(const TracedOp& op) {
     step.a = numbers_of(op.inputs[0]);
     if (op.op == "gated_sum") step.gates = numbers_of(op.inputs[2]);
   } else {
-    throw std::logic_error("Prepared: no step in whole numbers computes the op " + std::string(op.op));
+    throw std::logic_error("CompiledModel: no step in whole numbers computes the op " + std::string(op.op));
   }
   add_bytes(op.y);
 }
 
-void IntegerPlanner::add_bytes(const Variable& y) {
+void IntegerCompiler::add_bytes(const Variable& y) {
   if (!as_bytes(y.node())) return;
   const int x = numbers_.at(y.node()), to = new_map(y, true);
   add(Kind::to_bytes, "to bytes", x, to).scale = requantise(map(x).scale.step, map(to).scale.step);
 }
 
-void IntegerPlanner::take_input(const TracedOp& op) {
+void IntegerCompiler::take_input(const TracedOp& op) {
   const Variable& y = op.y;
   const bool bytes = as_bytes(y.node()) && !as_numbers(y.node());
   const int to = new_map(y, bytes);
@@ -185,11 +185,12 @@ void IntegerPlanner::take_input(const TracedOp& op) {
   if (!bytes) add_bytes(y);
 }
 
-void IntegerPlanner::concat(const TracedOp& op, int y) {
+void IntegerCompiler::concat(const TracedOp& op, int y) {
   Dim at = 0;
   for (const Variable& input : op.inputs) {
     const int x = numbers_of(input);
-    if (op.y.rank() > 2) throw std::logic_error("Prepared: a concat of maps has no step in whole numbers");
+    if (op.y.rank() > 2)
+      throw std::logic_error("CompiledModel: a concat of maps has no step in whole numbers");
     add(Kind::copy, "concat", x, y).at = at;
     at += map(x).channels;
   }
@@ -208,12 +209,12 @@ std::vector<std::uint8_t> packed(const QuantisedProduct& q, bool bytes) {
   return out;
 }
 
-void IntegerPlanner::add_product(const TracedOp& op, int x, int y, ProductTaps t) {
+void IntegerCompiler::add_product(const TracedOp& op, int x, int y, ProductTaps t) {
   constexpr double kSlopes = IntegerStep::kNoSlope;
   const auto slope = static_cast<std::int32_t>(std::lrint(op.settings.negative_slope * kSlopes));
   if (slope != IntegerStep::kNoSlope && (slope < 0 || slope > 63))
-    throw std::logic_error("Prepared: a negative slope of " + std::to_string(op.settings.negative_slope) +
-                           " has no step in whole numbers");
+    throw std::logic_error("CompiledModel: a negative slope of " +
+                           std::to_string(op.settings.negative_slope) + " has no step in whole numbers");
   IntegerStep& s = add(Kind::product, layer_of(op), x, y);
   const Dim rows = static_cast<Dim>(t.segments.size()) * t.length;
   s.weights = quantise(rows, t.w.values(), t.bias.values(), map(x).scale, map(y).scale);
@@ -225,8 +226,8 @@ void IntegerPlanner::add_product(const TracedOp& op, int x, int y, ProductTaps t
 }  // namespace
 
 std::shared_ptr<const IntegerPlan> IntegerPlan::of(const Network& network, const ActivationRanges& ranges) {
-  const TracedDrawing traced(network, Tensor::zeros(network.input_shape(1)));
-  const std::shared_ptr<IntegerPlan> plan = IntegerPlanner(network, ranges, traced).plan();
+  const TracedPrediction traced(network, Tensor::zeros(network.input_shape(1)));
+  const std::shared_ptr<IntegerPlan> plan = IntegerCompiler(network, ranges, traced).plan();
   plan->compile();
   return plan;
 }

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "layers/checkpoint.h"
-#include "models/inference/prepared/quantise.h"
+#include "models/inference/compiled/quantise.h"
 #include "models/networks/network.h"
 
 namespace supertac {

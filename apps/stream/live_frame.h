@@ -20,12 +20,12 @@ struct PictureFormat {
 };
 
 /// One picture of a stream and what belongs to it, valid until the next.
-struct Seen {
+struct LiveFrame {
   std::uint64_t number = 0;  ///< from 0, the row of a picture log of the whole stream
   double time_s = 0;         ///< since the stream's first frame
   double wall_s = NAN;  ///< time_s on the wall clock as it was at first (s since 1970); NaN where a recording
                         ///< does not say
-  std::span<const float> volts, picture;
+  std::span<const float> signals, picture;
   std::span<const float> half_widths;  ///< of each pixel's 90 % interval; empty when the model does not say
   std::optional<FrameArrival> arrival = {};  ///< of a board's frame
   std::optional<double> distance;  ///< of its window from those of training (models/inference/novelty.h)

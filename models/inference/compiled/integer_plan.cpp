@@ -1,4 +1,4 @@
-#include "models/inference/prepared/integer_plan.h"
+#include "models/inference/compiled/integer_plan.h"
 
 #include <string.h>
 
@@ -17,7 +17,7 @@ thread_local float number_step = 1;
 
 #define WORK work
 #define NUMBER_STEP number_step
-#include "models/inference/prepared/kernels.c"
+#include "models/inference/compiled/kernels.c"
 #undef WORK
 #undef NUMBER_STEP
 

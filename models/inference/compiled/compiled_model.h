@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "models/inference/prepared/ranges.h"
+#include "models/inference/compiled/ranges.h"
 #include "models/networks/network.h"
 
 namespace supertac {
@@ -22,17 +22,17 @@ using StepWatch = std::function<void(const std::string& step, const Tensor& map)
 /// Draws the network's pictures; they differ from the network's own by rounding, at most 1e-5 of the largest
 /// value. A picture has the same bits alone and in any batch, on every processor. Copies share their weights,
 /// and any thread may call.
-class Prepared {
+class CompiledModel {
  public:
   /// Copies the weights. The network must outlive this object, because with SUPERTAC_ISA=plain the network
   /// itself draws. Throws std::logic_error that names the op where one has no step.
-  explicit Prepared(const Network& network);
+  explicit CompiledModel(const Network& network);
   /// Computes in whole numbers (int8), by the C code of a microcontroller, which is slower here than fp32. It
   /// multiplies bytes, and numbers of 16 bits where bytes would be too coarse
-  /// (models/inference/prepared/integer_plan.h). The pictures differ from fp32's by rounding to steps that
+  /// (models/inference/compiled/integer_plan.h). The pictures differ from fp32's by rounding to steps that
   /// follow from the ranges. They have the same bits on every processor and microcontroller, and in any
   /// batch. Throws as IntegerPlan::of().
-  Prepared(const Network& network, const ActivationRanges& ranges);
+  CompiledModel(const Network& network, const ActivationRanges& ranges);
 
   const Network& network() const { return *network_; }
   /// Throws as Network::draw.
