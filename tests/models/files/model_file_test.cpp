@@ -97,7 +97,7 @@ TEST(ModelFile, TheFileNeverSizesAnything) {
                {settings("32", "4"), input, "encoder.0.mean.weight expected F32 [4,64], found F32 [3,64]"},
                {"[[[[", input, "metadata \"settings\""},
                {settings("32", "3"), R"({"rate_hz":300,"rest_volts":2.45,"span_volts":0,"filter_s":null})",
-                "|span| 1e-6 to 2e9, filter_s 0 to 10"}};
+                "|span_volts| 1e-6 to 2e9, filter_s 0 to 10"}};
   for (const auto& c : cases) {
     write(c.settings, c.input);
     EXPECT_NE(load_error(path).find(c.refusal), std::string::npos) << load_error(path);
