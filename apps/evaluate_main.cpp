@@ -46,12 +46,12 @@ std::string row(const std::string& name, const ZoneMetrics& metrics, const Laten
 
 /// The scores of the network and of every baseline over the same windows.
 struct RecordingScores {
-  RecordingScores(const WindowSet& windows, const ModelFile& model, const std::optional<Plate>& kind,
+  RecordingScores(const WindowSet& windows, const ModelFile& model, const std::vector<Plate>& kinds,
                   std::size_t methods)
       : by_distance(windows),
         by_group(windows),
         trust(windows, model),
-        map(windows, model, kind),
+        map(windows, model, kinds),
         by_pass(windows) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
@@ -65,8 +65,8 @@ struct RecordingScores {
 
 RecordingScores score_all(const Arguments& a, const Ensemble& network, const ModelFile& file,
                           const WindowSet& windows, const TestSet& tested, const Baselines& baselines,
-                          const std::optional<Plate>& kind, OutputsFile* outputs, EvaluationPage* page) {
-  RecordingScores scores(windows, file, kind, 1 + baselines.size());
+                          const std::vector<Plate>& kinds, OutputsFile* outputs, EvaluationPage* page) {
+  RecordingScores scores(windows, file, kinds, 1 + baselines.size());
   draw_all(a, network, windows, tested.split.test, baselines, [&](const Drawn& d) {
     const Zone zone = windows.zone(d.example);
     for (std::size_t m = 0; m < d.pictures.size(); ++m)
@@ -193,8 +193,8 @@ void declare(Arguments& a) {
       .writes();
   a.option(
       "elements", "KIND",
-      "where a map shows an element, draw one of this kind: bumps, ridges, blobs, or an STL file of a plate "
-      "with one element in its middle; maps are scored so too");
+      "where a map shows an element, draw one of this kind: bumps, ridges, blobs, any (the one of these that "
+      "it resembles most), or an STL file of a plate with one element in its middle; maps are scored so too");
   a.option("plates", "A,B,...", "only recordings of these plates (default: the model's own)");
   a.option("pictures", "DIR",
            "write PNG pictures: input | output | truth | how far off it may be, and a film of each test pass")
@@ -206,9 +206,9 @@ void declare(Arguments& a) {
 
 int run(Arguments& a) {
   if (a.given("map")) read_option("map", [&] { return check_map_path(a.text("map")), 0; });
-  std::optional<Plate> kind;
+  std::vector<Plate> kinds;
   if (a.given("elements"))
-    kind = read_option("elements", [&] { return kind_of_elements(a.text("elements")); });
+    kinds = read_option("elements", [&] { return kinds_of_elements(a.text("elements")); });
   const std::vector<ModelFile> files = load_models(a.list("model"));
   const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
   TestSet tested = test_set_of(a, files.front());
@@ -232,14 +232,14 @@ int run(Arguments& a) {
       fit_baselines(windows, tested.split.train, progress_of(a, "fitting the baselines", "parts"));
   EvaluationPage page(windows);
   const RecordingScores scores =
-      score_all(a, network, files.front(), windows, tested, baselines, kind,
+      score_all(a, network, files.front(), windows, tested, baselines, kinds,
                 a.given("outputs") ? &outputs : nullptr, a.given("report") ? &page : nullptr);
   const nlohmann::ordered_json result = report(a, network, windows, tested, baselines, scores);
   if (pictures) write_pictures(network, files.front().interval(), windows, tested.split.test, *pictures);
   if (a.given("outputs")) outputs.write(a.output("outputs"));
   if (a.given("map")) {
     std::vector<NamedMap> maps = scores.map.maps(a.text("map").ends_with(".safetensors"));
-    if (kind) std::ranges::for_each(maps, [&](NamedMap& map) { draw_as(map, *kind); });
+    if (!kinds.empty()) std::ranges::for_each(maps, [&](NamedMap& map) { draw_as(map, kinds); });
     write_maps(a.output("map"), maps);
   }
   if (a.given("report"))

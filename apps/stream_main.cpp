@@ -85,10 +85,10 @@ void declare(Arguments& a) {
               "keep the surface that was felt, as far as the finger's places are known: .png, .safetensors, "
               ".csv (its elements) or .stl (docs/map.md)")
       .writes()
-      .option(
-          "elements", "KIND",
-          "where the map shows an element, draw one of this kind: bumps, ridges, blobs, or an STL file of a "
-          "plate with one element in its middle")
+      .option("elements", "KIND",
+              "where the map shows an element, draw one of this kind: bumps, ridges, blobs, any (the one of "
+              "these "
+              "that it resembles most), or an STL file of a plate with one element in its middle")
       .option("record", "DIR", "keep the signals as a recording in this folder, the next pass of its plate")
       .option("plate", "NAME", "what the recording slides over: a plate's name, or an STL file", "unknown")
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
@@ -195,7 +195,7 @@ int run(Arguments& a) {
   if (a.given("seconds") && !probed) settings.seconds = a.number("seconds", 0.001, 1e9);
   const std::string origin = source_of(a);
   if (a.given("elements"))
-    settings.elements = read_option("elements", [&] { return kind_of_elements(a.text("elements")); });
+    settings.elements = read_option("elements", [&] { return kinds_of_elements(a.text("elements")); });
   settings.web = web_address(a);
   settings.badge = badge_of(a), settings.source = origin;
   const bool drawn = a.given("model");

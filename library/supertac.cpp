@@ -144,7 +144,8 @@ int supertac_describe(const supertac_model* model, supertac_description* descrip
                                     .pixel_mm = {pixel.x, pixel.y},
                                     .filter_s = input.filter_s.value_or(-1),
                                     .rest = input.scaling.rest,
-                                    .span = input.scaling.span};
+                                    .span = input.scaling.span,
+                                    .delay_s = input.delay_s};
     std::memcpy(description, &full, full.size);
     return 0;
   });

@@ -46,6 +46,7 @@ typedef struct {
   double
       filter_s; /* moving average that the training signals went through; 0: none; -1: of several lengths */
   double rest, span; /* a sample is clip((rest - value) / span, 0, 1), value in the sensor's unit */
+  double delay_s; /* a picture shows where the finger was so long ago; supertac_map_add() takes that place */
 } supertac_description;
 
 /* "0.2.0" */

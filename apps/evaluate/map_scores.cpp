@@ -8,8 +8,13 @@
 
 namespace supertac {
 
-MapScores::MapScores(const WindowSet& windows, const ModelFile& model, std::optional<Plate> kind)
-    : windows_(windows), model_(model), kind_(std::move(kind)), by_pass_(windows), by_surface_(windows) {}
+MapScores::MapScores(const WindowSet& windows, const ModelFile& model, std::vector<Plate> kinds)
+    : windows_(windows),
+      model_(model),
+      stated_(!kinds.empty()),
+      kinds_(stated_ ? std::move(kinds) : kinds_of_elements(kAnyKind)),
+      by_pass_(windows),
+      by_surface_(windows) {}
 
 std::string MapScores::surface_of(std::size_t pass) const {
   const WindowSet::Pass& p = windows_.passes()[pass];
@@ -31,7 +36,9 @@ void MapScores::finish() {
   std::vector<float> read(windows_.image().pixels()), truth(read.size());
   std::map<const SurfaceMap*, Plate> drawn;  // where the kind of the elements is stated
   const auto state = [&](const SurfaceMap& map, std::size_t pass) {
-    if (kind_) drawn.emplace(&map, plate_of(elements(named("", map, pass)), *kind_));
+    if (!stated_) return;
+    NamedMap one = named("", map, pass);
+    drawn.emplace(&map, plate_of(elements(one), recognise(one, kinds_)));
   };
   for (const auto& [pass, map] : of_pass_) state(map, pass);
   for (const auto& [name, map] : of_surface_) state(map.first, map.second);
@@ -40,7 +47,7 @@ void MapScores::finish() {
     const auto [x, y] = windows_.position(window);
     windows_.truth(window, truth);
     const auto score = [&](const SurfaceMap& map, Scored& scored) {
-      kind_ ? truth_image(drawn.at(&map), x, y, windows_.image(), read) : map.read(x, y, read);
+      stated_ ? truth_image(drawn.at(&map), x, y, windows_.image(), read) : map.read(x, y, read);
       scored.zones.add(read, truth, windows_.zone(window));
       if (const auto one = contact_score(windows_, window, read, truth))
         scored.by_distance.add(*one), scored.by_pass.add(*one);
@@ -66,7 +73,7 @@ std::vector<std::string> MapScores::lines() const {
            " false";
   };
   std::vector<std::string> lines = {std::string("in contact, read back from the map of the pass") +
-                                    (kind_ ? ", elements drawn as stated: " : ": ") + text(by_pass_) +
+                                    (stated_ ? ", elements drawn as stated: " : ": ") + text(by_pass_) +
                                     "; from that of all passes: " + text(by_surface_)};
   if (by_surface_.elements.existing > 0)
     lines.push_back("elements found within " + format(ElementScores::kFoundMm) +
@@ -93,9 +100,12 @@ nlohmann::ordered_json MapScores::to_json() const {
                     {"median_mm", middle(scored->elements.distances_mm)},
                     {"pitch_error_mm", middle(scored->elements.pitch_errors_mm)}}}};
   }
-  for (const NamedMap& map : maps(false)) {
+  for (const NamedMap& map : maps(true)) {
     const std::vector<Element> found = elements(map);
-    auto& rows = json["surfaces"][map.name] = {{"pitch_mm", number(pitch_mm(found))}};
+    const bool whole = of_surface_.contains(map.name);
+    auto& rows = json[whole ? "surfaces" : "passes"][map.name] = {
+        {"kind", map.kind}, {"kind_share", map.kind_share}, {"pitch_mm", number(pitch_mm(found))}};
+    if (!whole) continue;
     for (const Element& e : found)
       for (auto& row = rows["elements"].emplace_back(); const auto& [name, value] : numbers_of(e))
         row[name] = value;
@@ -107,6 +117,7 @@ NamedMap MapScores::named(const std::string& name, const SurfaceMap& map, std::s
   NamedMap named{.name = name, .cells = map.cells(map.felt()), .cell_mm = map.grid().pixel_mm};
   model_.interval().half_widths(named.cells.values, named.cells.region.width, named.cells.errors,
                                 named.cells.errors);
+  recognise(named, kinds_);
   if (windows_.truth_is_measured(pass)) return named;
   for (std::size_t c = 0; c < named.cells.values.size(); ++c) {
     const auto [x, y] = centre_of(named, c);

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,10 +21,10 @@ namespace supertac {
 /// known belong to no map.
 class MapScores {
  public:
-  /// `model`: whose intervals the maps have; both must outlive this. `kind`: of the elements, where it is
-  /// known (data/map/elements.h): pictures are then read back from what the maps are with elements of that
-  /// kind.
-  MapScores(const WindowSet& windows, const ModelFile& model, std::optional<Plate> kind);
+  /// `model`: whose intervals the maps have; both must outlive this. `kinds`: of the elements, where that is
+  /// stated (kinds_of_elements()), else empty: pictures are then read back from what the maps are with
+  /// elements of the kind among these that each resembles most.
+  MapScores(const WindowSet& windows, const ModelFile& model, std::vector<Plate> kinds);
   /// Windows of a pass come in the order of time.
   void add(const Drawn& drawn);
   /// When all have come: reads them back. Before the rest below.
@@ -36,7 +35,8 @@ class MapScores {
   std::vector<std::string> lines() const;
   /// {"of_pass": {"ssim", "psnr_mean_db", "felt": as DistanceScores, "over_passes": as
   /// PassScores, "elements": {"existing", "found", "false", "median_mm", "pitch_error_mm"}},
-  /// "of_surface": the same, "surfaces": {PLATE_tTRIAL: {"pitch_mm", "elements": [{"x_mm", "y_mm", ...}]}}}
+  /// "of_surface": the same, "surfaces": {PLATE_tTRIAL: {"kind", "kind_share", "pitch_mm", "elements":
+  /// [{"x_mm", "y_mm", ...}]}}, "passes": {PLATE_tTRIAL_pPASS: the same without "elements"}}
   nlohmann::ordered_json to_json() const;
   /// As the network has them. PLATE_tTRIAL; with passes PLATE_tTRIAL_pPASS behind them.
   std::vector<NamedMap> maps(bool passes) const;
@@ -55,7 +55,8 @@ class MapScores {
 
   const WindowSet& windows_;
   const ModelFile& model_;
-  std::optional<Plate> kind_;
+  bool stated_;
+  std::vector<Plate> kinds_;  // all that are known, where none is stated
   std::map<std::size_t, SurfaceMap> of_pass_;
   std::map<std::string, std::pair<SurfaceMap, std::size_t>> of_surface_;  // and one of its passes
   std::vector<std::uint32_t> added_;

@@ -86,7 +86,7 @@ std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& wi
   for_each_output(network, windows, chosen, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < b.size(); ++n) {
       const auto drawn = b.output(n), truth = b.target(n);
-      ShownWindow one{.input = mean_of_channels(windows.array(), windows.last_frame(chosen[b.first + n])),
+      ShownWindow one{.input = mean_of_channels(windows.array(), windows.shown_frame(chosen[b.first + n])),
                       .drawn = {drawn.begin(), drawn.end()},
                       .truth = {truth.begin(), truth.end()},
                       .half_widths = {}};

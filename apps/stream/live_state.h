@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/stream/live_frame.h"
-#include "data/map/surface_map.h"
+#include "data/map/map_file.h"
 
 namespace supertac {
 
@@ -32,8 +32,9 @@ struct LiveState {
   bool unlike_training = false;  ///< the signals are not such as the model has learnt from
   std::string texture;           ///< that the picture shows, by a classifier; empty: none, or no texture
   double texture_probability = 0;
-  float x_mm = NAN, y_mm = NAN;  ///< of the finger's centre on the plate, where known
-  MapCells map;                  ///< what has changed of the surface that was felt; empty: nothing
+  float x_mm = NAN, y_mm = NAN;     ///< of the finger's centre on the plate, where known
+  MapCells map;                     ///< what has changed of the surface that was felt; empty: nothing
+  std::optional<NamedMap> surface;  ///< all of it, once a second
   double frames_per_s = 0;
   double median_ms = 0, p99_ms = 0;  ///< latency
   std::uint64_t lost = 0, dropped = 0;

@@ -46,6 +46,8 @@ class PictureMaker {
 
   PictureFormat format() const;
   ImageGrid image() const { return model_.windows().array->picture(model_.windows().scale); }
+  /// How long ago the finger was where a picture shows it.
+  double delay_s() const { return model_.input.delay_s; }
   /// Seconds of signal that a picture needs.
   double window_s() const;
   const LiveWindow& window() const { return window_; }

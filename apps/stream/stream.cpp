@@ -75,7 +75,8 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   web_ = std::make_unique<WebView>(
       *settings.web,
       WebSource{settings.badge, settings.source, source.array(), state_.scale, format.half_widths,
-                classifier_.has_value(), state_.unit, state_.draws, source.silent(), settings.found},
+                classifier_.has_value(), state_.unit, state_.draws, maker_ ? maker_->delay_s() : 0,
+                source.silent(), settings.found, [this](MapCells cells) { return named(std::move(cells)); }},
       *recorder_);
 }
 
@@ -156,15 +157,16 @@ void Stream::write_map() const {
         settings_.map.path +
         ": no map, since no picture's place is known; expected --model and a --recording "
         "with positions, which supertac-collect and supertac-import give");
-  NamedMap map = named_map();
-  if (settings_.elements) draw_as(map, *settings_.elements);
+  NamedMap map = named(map_->cells(map_->felt()));
+  if (!settings_.elements.empty()) draw_as(map, settings_.elements);
   write_maps(settings_.map, {map});
 }
 
-NamedMap Stream::named_map() const {
-  MapCells cells = map_->cells(map_->felt());
+NamedMap Stream::named(MapCells cells) const {
   maker_->interval().half_widths(cells.values, cells.region.width, cells.errors, cells.errors);
-  return {"surface", std::move(cells), map_->grid().pixel_mm};
+  NamedMap map{.name = "surface", .cells = std::move(cells), .cell_mm = map_->grid().pixel_mm};
+  recognise(map, settings_.elements.empty() ? kinds_of_elements(kAnyKind) : settings_.elements);
+  return map;
 }
 
 // Empty where frames come as often as the source says, to a twentieth.
@@ -189,7 +191,7 @@ std::string Stream::summary() const {
                               : "") +
          (lines_lost_ > 0 ? ", " + std::to_string(lines_lost_) + " lines not taken by their reader" : "") +
          (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "") +
-         (map_ && !map_->empty() ? "; map of " + elements_text(elements(named_map())) : "") +
+         (map_ && !map_->empty() ? "; map of " + elements_text(named(map_->cells(map_->felt()))) : "") +
          (record_ ? "; recorded " + record_path_ : "") +
          (record_ && record_->left_out() > 0
               ? ", " + std::to_string(record_->left_out()) + " frames left out, their time being uncertain"
@@ -242,6 +244,11 @@ bool Stream::take(SensorFrame frame) {
   if (record_ || recorder_ || !maker_) keep_raw(frame);
   if (!maker_) return true;
   maker_->push(frame);
+  // The first is the newest that is as old as what the next picture shows.
+  if (!places_.empty() && frame.time_s < places_.back().time_s) places_.clear();
+  places_.push_back({frame.time_s, frame.x_mm, frame.y_mm, frame.lift_mm});
+  while (places_.size() > 1 && places_[1].time_s <= frame.time_s - maker_->delay_s() + kCellSlack)
+    places_.pop_front();
   if (source_.live() && monotonic_seconds() - frame.arrived_s > kMostLateS) {
     ++too_late_;
     return true;
@@ -291,8 +298,9 @@ void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
   unlike_ += state_.unlike_training ? 1 : 0;
   state_.picture.assign(picture.begin(), picture.end());
   state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
-  if (!map_ || !std::isfinite(frame.x_mm) || !std::isfinite(frame.y_mm) || frame.lift_mm > kLiftedMm) return;
-  map_->add(frame.x_mm, frame.y_mm, picture, maker_->predicted_errors());
+  const Place& shown = places_.front();
+  if (!map_ || !std::isfinite(shown.x_mm) || !std::isfinite(shown.y_mm) || shown.lift_mm > kLiftedMm) return;
+  map_->add(shown.x_mm, shown.y_mm, picture, maker_->predicted_errors());
   changed_ = changed_.with(map_->newest());
 }
 

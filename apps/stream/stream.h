@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <limits>
 #include <map>
 #include <memory>
@@ -26,13 +27,13 @@ struct StreamSettings {
   double seconds = std::numeric_limits<double>::infinity();  ///< of signal, after which run() ends
   OutputPath out = "";  ///< file that keeps the pictures; "-": a line for each to stdout; empty: none
   Precision precision = Precision::fp32;
-  std::string classifier = {};          ///< file that names the texture; empty: none
-  OutputPath mcap = "";                 ///< MCAP file that keeps frames and pictures; empty: none
-  std::string record = {};              ///< folder that gets a recording; empty: none
-  std::string plate = "unknown";        ///< of the recording: a plate's name or an STL file
-  OutputPath map = "";                  ///< file of the surface that was felt; empty: none
-  std::optional<Plate> elements = {};   ///< the kind that the map's elements are drawn as, where it is known
-  bool view = false;                    ///< show the figures on the terminal
+  std::string classifier = {};       ///< file that names the texture; empty: none
+  OutputPath mcap = "";              ///< MCAP file that keeps frames and pictures; empty: none
+  std::string record = {};           ///< folder that gets a recording; empty: none
+  std::string plate = "unknown";     ///< of the recording: a plate's name or an STL file
+  OutputPath map = "";               ///< file of the surface that was felt; empty: none
+  std::vector<Plate> elements = {};  ///< kinds that the map's elements may be drawn as, where that is stated
+  bool view = false;                 ///< show the figures on the terminal
   std::optional<WebAddress> web = {};   ///< serve the live page
   std::string badge = {}, source = {};  ///< for the page: what is streamed
   std::vector<std::string> found = {};  ///< for the page: what a probe of the source found, a line each
@@ -77,7 +78,7 @@ class Stream {
   void keep_raw(const SensorFrame& frame);
   void output(const LiveFrame& seen);
   void write_map() const;
-  NamedMap named_map() const;
+  NamedMap named(MapCells cells) const;
   void complete();
   void describe_recording();
   void show();
@@ -99,6 +100,11 @@ class Stream {
   std::unique_ptr<Recorder> recorder_;  // at the page's wish
   std::unique_ptr<WebView> web_;
   std::optional<NamedClassifier> classifier_;
+  struct Place {
+    double time_s;
+    float x_mm, y_mm, lift_mm;
+  };
+  std::deque<Place> places_;       // of the finger, since what the newest picture shows
   std::optional<SurfaceMap> map_;  // where somebody wants it
   MapRegion changed_;              // of it, since the page was told
   LatencyHistogram latency_;

@@ -51,6 +51,10 @@ void declare_window_training(Arguments& a) {
       "rate", "HZ",
       "of the model's samples: T samples span T / HZ seconds; the paper's is 300, and the board's filter "
       "leaves nothing above 10 (default: 100; preset tiny: 50)");
+  a.option("delay", "S",
+           "each picture shows where the finger was so long ago, since later windows know more of a place "
+           "(docs/map.md)",
+           "0");
   a.option("range", "REST,SPAN",
            "a signal V becomes clip((REST - V) / SPAN, 0, 1), in the unit of the recordings; auto: "
            "the rig's 2.45,0.36, or where it does not fit what the recordings show",
@@ -126,6 +130,7 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
   if (a.given("stride")) r.stride = a.integer("stride", 1, 100'000);
   if (a.given("random-plates")) r.random_plates = a.integer("random-plates", 0, 50'000);
   if (a.given("rate")) r.rate_hz = a.number("rate", 20, 2000);
+  if (a.given("delay")) r.delay_s = a.number("delay", 0, 10);
   if (a.given("range")) r.range = stated_range(a);
   if (a.given("scaling")) r.per_window = a.choice("scaling", {"per-window", "fixed"}) == "per-window";
   if (a.given("augment")) {

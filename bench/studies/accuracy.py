@@ -2,8 +2,9 @@
 """The figures of bench/results/accuracy.md and unseen_plates.md, from the real recordings as text.
 
     bench/studies/accuracy.py known  BIN TEXT_DIR OUT_DIR [SEEDS]    presets paper and tiny, passes aligned and not
-    bench/studies/accuracy.py passes BIN TEXT_DIR OUT_DIR [SEEDS]    preset paper, by pass, pictures and maps; no pass of
-                                                                     trial 2 has helped to find a place of trial 1
+    bench/studies/accuracy.py passes BIN TEXT_DIR OUT_DIR [SEEDS]    preset paper, and with --delay, by pass, pictures and
+                                                                     maps; no pass of trial 2 has helped to find a
+                                                                     place of trial 1
     bench/studies/accuracy.py elements BIN TEXT_DIR OUT_DIR [SEEDS]  what maps show of known plates (trial 2), and of each of
                                                                      them when it was left out of the training; with its
                                                                      kind stated and without
@@ -71,8 +72,8 @@ class Study:
         """Trial 1 and trial 2, each registered without the other."""
         return self.linked("apart", {p.name: p for of in (self.first, self.alone) for p in of.glob("*.safetensors")})
 
-    def trained_apart(self, name, plates, seed):
-        return self.train(name, self.apart(), "--split", "trial", "--seed", seed, "--plates", ",".join(plates))
+    def trained_apart(self, name, plates, seed, *options):
+        return self.train(name, self.apart(), "--split", "trial", "--seed", seed, "--plates", ",".join(plates), *options)
 
     def evaluated(self, name, models, data, *options):
         path = self.out / f"{name}.json"
@@ -101,14 +102,18 @@ def known(study):
     write(study.out / "whole_passes.csv", lines)
 
 
-def by_pass(found):
-    """What an evaluation says of each pass: of the pictures, and as read back from the two maps."""
+def by_pass(found, drawn=None):
+    """What an evaluation says of each pass: of the pictures, and as read back from the two maps; and from those `drawn` with
+    elements of the kind that they resemble most."""
     of = {"": found, "map_": found["map"]["of_pass"], "plate_map_": found["map"]["of_surface"]}
+    if drawn:
+        of |= {"kind_map_": drawn["map"]["of_pass"], "kind_plate_map_": drawn["map"]["of_surface"]}
     parts = {prefix: part["over_passes"]["passes"] for prefix, part in of.items()}
     for number, one in enumerate(parts[""]):
         yield {key: one[key] for key in ("plate", "trial", "pass", "windows")} | {
             prefix + name: f"{part[number][key]:.4f}" for prefix, part in parts.items()
-            for key, name in (("ssim", "ssim"), ("psnr_mean_db", "psnr_db"))}
+            for key, name in (("ssim", "ssim"), ("psnr_mean_db", "psnr_db"))} | (
+                drawn["map"]["passes"][f"{one['plate']}_t{one['trial']}_p{one['pass']}"] if drawn else {})
 
 
 def of_surface(found):
@@ -126,15 +131,17 @@ def of_surface(found):
 
 def passes(study):
     models, lines, surfaces, both = {}, [], [], study.apart()
-    for seed in study.seeds:
-        models[seed] = study.trained_apart(f"apart_s{seed}", KNOWN, seed)
-        found = study.evaluated(f"apart_s{seed}_passes", [models[seed]], both)
-        baselines = [{"method": method, "ssim": one["contact"]["ssim"], "psnr_db": one["contact"]["psnr_mean_db"]}
-                     for method, one in found["baselines"].items()]
-        lines += [{"network": "paper", "seed": seed, **one} for one in by_pass(found)]
-        for plate in KNOWN:
-            found = study.evaluated(f"apart_s{seed}_{plate}", [models[seed]], both, "--plates", plate)
-            surfaces.append({"network": "paper", "seed": seed, "plate": plate, **of_surface(found)})
+    for name, network, *delay in (("late", "paper, 0.6 s later", "--delay", "0.6"), ("apart", "paper")):
+        for seed in study.seeds:
+            models[seed] = study.trained_apart(f"{name}_s{seed}", KNOWN, seed, *delay)
+            found, drawn = (study.evaluated(f"{name}_s{seed}_{of}", [models[seed]], both, *also)
+                            for of, *also in (("passes",), ("kinds", "--elements", "any")))
+            lines += [{"network": network, "seed": seed, **one} for one in by_pass(found, drawn)]
+            baselines = [{"method": method, "ssim": one["contact"]["ssim"], "psnr_db": one["contact"]["psnr_mean_db"]}
+                         for method, one in found["baselines"].items()]
+            for plate in KNOWN:
+                found = study.evaluated(f"{name}_s{seed}_{plate}", [models[seed]], both, "--plates", plate)
+                surfaces.append({"network": network, "seed": seed, "plate": plate, **of_surface(found)})
     for seed in study.seeds if len(study.seeds) > 1 else ():
         found = study.evaluated(f"apart_without_s{seed}_passes", [m for s, m in models.items() if s != seed], both)
         lines += [{"network": "all but this one, averaged", "seed": seed, **one} for one in by_pass(found)]

@@ -180,30 +180,63 @@ double pitch_mm(const std::vector<Element>& elements) {
   return nearest.empty() ? std::nan("") : median(nearest);
 }
 
-std::string elements_text(const std::vector<Element>& elements) {
-  const double pitch = pitch_mm(elements);
-  return std::to_string(elements.size()) + (elements.size() == 1 ? " element" : " elements") +
-         (std::isfinite(pitch) ? ", " + format(pitch, 2) + " mm apart" : "");
+std::string elements_text(const NamedMap& map) {
+  const std::vector<Element> found = elements(map);
+  const double pitch = pitch_mm(found);
+  return std::to_string(found.size()) + (found.size() == 1 ? " element" : " elements") +
+         (std::isfinite(pitch) ? ", " + format(pitch, 2) + " mm apart" : "") +
+         (map.kind.empty() ? ""
+                           : ", most like " + map.kind + ", which explain " +
+                                 format(100 * map.kind_share, 0) + " % of it");
 }
 
-Plate kind_of_elements(const std::string& name) {
+std::vector<Plate> kinds_of_elements(const std::string& name) {
+  if (name == kAnyKind) {
+    std::vector<Plate> all;
+    for (const char* one : {"bumps", "ridges", "blobs"}) all.push_back(kinds_of_elements(one).front());
+    return all;
+  }
   const bool word = std::ranges::all_of(name, [](char c) { return c >= 'a' && c <= 'z'; });
   Plate kind = Plate::named(word ? name + format(rig::kTextureToMm - rig::kTextureFromMm, 0) : name);
   if (kind.crests().size() != 1 || kind.min_height() < 0)
     throw std::invalid_argument(
-        "elements: expected bumps, ridges or blobs, or a plate with one element in its "
+        "elements: expected bumps, ridges, blobs or any, or a plate with one element in its "
         "middle, found " +
         name + ", whose plate has " + std::to_string(kind.crests().size()) +
         (kind.min_height() < 0 ? " and troughs" : ""));
-  return kind;
+  return {kind};
+}
+
+const Plate& recognise(NamedMap& map, const std::vector<Plate>& kinds) {
+  const std::vector<Element> found = elements(map);
+  const Plate* alike = &kinds.front();
+  double least = std::numeric_limits<double>::infinity();
+  for (const Plate& kind : kinds) {
+    const Plate plate = plate_of(found, kind);
+    double squares = 0, high = 0, within = 0;
+    for (std::size_t c = 0; c < map.cells.values.size(); ++c) {
+      const double value = map.cells.values[c];
+      if (std::isnan(value)) continue;
+      const auto [x, y] = centre_of(map, c);
+      const double drawn = truth_value(plate, x, y), off = std::abs(drawn - value);
+      squares += off * off;
+      if (std::max(drawn, value) < kSaddle * kLowest) continue;
+      high += 1, within += map.cells.errors.empty() || off <= map.cells.errors[c] ? 1 : 0;
+    }
+    if (squares >= least) continue;
+    least = squares, alike = &kind, map.kind_share = high > 0 ? within / high : 0;
+  }
+  if (!found.empty()) map.kind = alike->textures().empty() ? alike->name() : alike->textures()[0].kind;
+  return *alike;
 }
 
 Plate plate_of(const std::vector<Element>& found, const Plate& kind) {
   return {"stated", std::make_shared<const Placed>(found, kind)};
 }
 
-void draw_as(NamedMap& map, const Plate& kind) {
+void draw_as(NamedMap& map, const std::vector<Plate>& kinds) {
   const std::vector<Element> found = elements(map);
+  const Plate& kind = recognise(map, kinds);
   const Plate drawn = plate_of(found, kind);
   std::vector<Plate> moved;
   for (const double x : {-1, 1}) {

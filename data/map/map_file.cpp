@@ -108,13 +108,13 @@ void write_tensors(const OutputPath& output, const std::vector<NamedMap>& maps) 
 std::string table_of(const std::vector<NamedMap>& maps) {
   std::string table = "map,element";
   for (const auto& [name, number] : numbers_of({})) table += std::string(",") + name;
-  table += "\n";
+  table += ",kind,kind_share\n";
   for (const NamedMap& map : maps) {
     int count = 0;
     for (const Element& e : elements(map)) {
       table += map.name + "," + std::to_string(++count);
       for (const auto& [name, number] : numbers_of(e)) table += "," + format(number, 3);
-      table += "\n";
+      table += "," + map.kind + "," + format(map.kind_share, 3) + "\n";
     }
   }
   return table;

@@ -15,6 +15,8 @@ struct NamedMap {
   MapCells cells;  ///< its errors as half of each cell's 90 % interval
   Pitch cell_mm;
   std::vector<float> truth = {};  ///< of the cells, where it is known
+  std::string kind = {};  ///< that its elements resemble most: recognise() of elements.h; empty: not asked
+  double kind_share = 0;  ///< how well
 };
 
 /// Of a cell (mm), x and y.
@@ -29,7 +31,7 @@ void check_map_path(const std::string& path);
 ///   .safetensors  for each map NAME.values, NAME.errors and NAME.truth F32 [height][width], NaN where
 ///                 nothing was felt; metadata NAME.corner_mm is the place of the corner of the first cell,
 ///                 cell_mm the size of a cell, [x,y] both
-///   .csv          a row for each element (data/map/elements.h) of each map, lengths in mm
+///   .csv          a row for each element (data/map/elements.h) of each map, lengths in mm; kind of its map
 ///   .stl          one map as a solid to print, 1 being rig::kTextureHeightMm high, as far above its bottom
 ///                 as plate_mesh.h's; what was never felt lies kSunkMm below the plane
 /// Throws std::invalid_argument as check_map_path(), for no map, or more than one for .stl; FileError.

@@ -48,7 +48,7 @@ std::vector<std::string> remarks_on(const WindowSet& windows, std::span<const st
   if (chosen.empty()) return {};
   SwingRanges swings(windows.array().signals());
   bool touched = false;
-  for (const std::uint32_t i : evenly_spaced(chosen, kLookedAt)) swings.add(windows.last_frame(i));
+  for (const std::uint32_t i : evenly_spaced(chosen, kLookedAt)) swings.add(windows.shown_frame(i));
   for (const std::uint32_t i : chosen) touched = touched || windows.contact(i);
   std::vector<std::string> remarks;
   const std::vector<std::size_t> still = swings.still();

@@ -30,6 +30,17 @@ void check(const WindowSettings& s) {
   if (!(s.rate_hz > 0) || !(s.max_gap_s > 0) || !(std::abs(s.scaling.span) > 0))
     fail("rate_hz and max_gap_s must be positive, span not 0, got " + std::to_string(s.rate_hz) + ", " +
          std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span));
+  if (!(s.delay_s >= 0 && std::lround(s.delay_s * s.rate_hz) < s.timesteps))
+    fail("what is shown must lie in the window, got a delay of " + format(s.delay_s) + " s");
+}
+
+// Each frame gets the place and the truth of an earlier one. Of the first few there is none; they end no
+// window, since a window is longer than its delay.
+void delay_truth(Track& track, std::size_t frames) {
+  const auto shift = [&](auto& values, std::size_t each) {
+    std::shift_right(values.begin(), values.end(), static_cast<std::ptrdiff_t>(each * frames));
+  };
+  shift(track.position_mm, 2), shift(track.lift_mm, 1), shift(track.recorded, 1);
 }
 
 // Pressed as deep as rigs press it, it is clear of the plate when lifted by so much more than the highest
@@ -170,10 +181,11 @@ void WindowSet::add(const Recording& recording, const std::string& folder, const
   expect_array(recording);
   expect_unit(recording.signal_scale);
   Stored stored{.plate = plate_index(recording, folder)};
-  const Track track = resample(recording, {.rate_hz = settings_.rate_hz,
-                                           .max_gap_s = settings_.max_gap_s,
-                                           .frames_apart = settings_.timesteps == 1,
-                                           .scaling = settings_.scaling});
+  Track track = resample(recording, {.rate_hz = settings_.rate_hz,
+                                     .max_gap_s = settings_.max_gap_s,
+                                     .frames_apart = settings_.timesteps == 1,
+                                     .scaling = settings_.scaling});
+  delay_truth(track, delay());
   Pass pass{.plate = recording.plate,
             .trial = recording.trial,
             .pass = recording.pass,
@@ -280,10 +292,10 @@ std::vector<float> WindowSet::window(std::size_t i) const {
   return values;
 }
 
-std::vector<float> WindowSet::last_frame(std::size_t i) const {
+std::vector<float> WindowSet::shown_frame(std::size_t i) const {
   std::vector<float> values(array().signals());
   const Place place = place_of(i);
-  file_->read(stored_[place.pass].samples + place.last * array().signals(), values);
+  file_->read(stored_[place.pass].samples + (place.last - delay()) * array().signals(), values);
   return values;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -22,6 +23,7 @@ struct WindowSettings {
   int timesteps = 256;                   ///< T, frames per window
   int scale = 4;                         ///< 2, 4, 8 or 16: truths that many times finer than the array
   double rate_hz = 300;                  ///< the model's rate
+  double delay_s = 0;                    ///< by how much what a window shows is older than its last frame
   Scaling scaling = {};                  ///< volts to [0,1]
   std::optional<TaxelArray> array = {};  ///< that every recording must have; nothing: that of the first
   std::optional<SignalScale> signal_scale = {};  ///< likewise, its unit and polarity
@@ -123,11 +125,12 @@ class WindowSet {
   void window(std::size_t i, std::span<float> out) const;
   /// The window, not normalised.
   std::vector<float> window(std::size_t i) const;
-  /// Truth of its last frame, [height][width] of image(): as measured, or truth_image; 0 in the air.
+  /// Of the frame that it shows, the last, or where that is delayed an earlier one, [height][width] of
+  /// image(): as measured, or truth_image; 0 in the air.
   void truth(std::size_t i, std::span<float> out) const;
-  /// The last frame, [signals].
-  std::vector<float> last_frame(std::size_t i) const;
-  /// The finger's centre on the plate; NaN where it is unknown.
+  /// That frame, [signals].
+  std::vector<float> shown_frame(std::size_t i) const;
+  /// The finger's centre on the plate in that frame; NaN where it is unknown.
   Position position(std::size_t i) const;
   /// "x 18.0, y 43.5 mm", or where that is unknown "frame 17".
   std::string place_text(std::size_t i) const;
@@ -179,6 +182,9 @@ class WindowSet {
   void add_windows(const Track& track, std::size_t first, std::size_t end, std::uint32_t stride);
   void store(const Recording& recording, const Track& track, Stored& stored);
   Place place_of(std::size_t i) const;
+  std::size_t delay() const {
+    return static_cast<std::size_t>(std::lround(settings_.delay_s * settings_.rate_hz));
+  }
   std::array<float, 3> finger(const Place& place) const;
 
   WindowSettings settings_;

@@ -53,16 +53,17 @@ InputSettings read_input(JsonObject entry) {
       {entry.number("rest_volts"), entry.number("span_volts"), entry.flag("levelled", false)},
       filtered ? std::optional(entry.number("filter_s")) : std::nullopt,
       pitch_of(entry, InputSettings{}.pitch_mm),
-      signals != nullptr ? scale_of({*signals, entry.where()}) : SignalScale{}};
+      signals != nullptr ? scale_of({*signals, entry.where()}) : SignalScale{},
+      entry.find("delay_s") != nullptr ? entry.number("delay_s") : 0};
   const double span = std::abs(input.scaling.span);
   if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest) > 2e9 || span <= 1e-6 ||
       span > 2e9 || input.filter_s.value_or(0) < 0 || input.filter_s.value_or(0) > 10 ||
       std::min(input.pitch_mm.x, input.pitch_mm.y) < 0.1 ||
-      std::max(input.pitch_mm.x, input.pitch_mm.y) > 100) {
+      std::max(input.pitch_mm.x, input.pitch_mm.y) > 100 || input.delay_s < 0 || input.delay_s > 10) {
     throw std::runtime_error(
         entry.where() +
         ": expected rate_hz 1 to 100000, |rest_volts| <= 2e9, |span_volts| 1e-6 to 2e9, filter_s 0 to 10, "
-        "pitch_mm 0.1 to 100");
+        "pitch_mm 0.1 to 100, delay_s 0 to 10");
   }
   return input;
 }
@@ -115,6 +116,7 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
   if (input.scaling.per_window) scaling["levelled"] = true;
   if (input.pitch_mm != InputSettings{}.pitch_mm) scaling["pitch_mm"] = json_of(input.pitch_mm);
   if (input.signal_scale != SignalScale{}) scaling["signals"] = json_of(input.signal_scale);
+  if (input.delay_s > 0) scaling["delay_s"] = input.delay_s;
   return {{"settings", settings.dump()}, {"input", scaling.dump()}};
 }
 
@@ -147,6 +149,7 @@ WindowSettings ModelFile::windows() const {
   w.timesteps = static_cast<int>(model->settings().timesteps);
   w.scale = static_cast<int>(model->settings().scale);
   w.rate_hz = input.rate_hz;
+  w.delay_s = input.delay_s;
   w.scaling = input.scaling;
   w.array = array();
   w.signal_scale = input.signal_scale;
@@ -155,7 +158,7 @@ WindowSettings ModelFile::windows() const {
 
 InputSettings input_of(const WindowSet& windows) {
   return {windows.settings().rate_hz, windows.settings().scaling, windows.filter_s(),
-          windows.array().pitch_mm, windows.signal_scale()};
+          windows.array().pitch_mm,   windows.signal_scale(),     windows.settings().delay_s};
 }
 
 void set_array(SuperTacSettings& settings, const TaxelArray& array) {

@@ -30,6 +30,7 @@ struct InputSettings {
   std::optional<double> filter_left(double done_s) const;
   Pitch pitch_mm = 3;             ///< of the array
   SignalScale signal_scale = {};  ///< as the recordings state it: unit, polarity and range of the signals
+  double delay_s = 0;             ///< of pictures: as WindowSettings
 };
 
 /// The metadata keys "settings" and "input", JSON texts.

@@ -43,6 +43,8 @@ void Recipe::check() const {
   model.check();
   loss.check();
   require(rate_hz >= 20 && rate_hz <= 2000, "rate_hz from 20 to 2000", rate_hz);
+  require(delay_s >= 0 && delay_s * rate_hz < static_cast<double>(model.timesteps) - 0.5,
+          "a delay from 0 to less than the window", delay_s);
   require(stride >= 1 && stride <= 100'000, "stride from 1 to 100000", static_cast<double>(stride));
   require(random_plates >= 0 && random_plates <= 50'000, "random_plates from 0 to 50000",
           static_cast<double>(random_plates));
@@ -135,6 +137,7 @@ Recipe Recipe::of(const ModelFile& file, const std::string& path) {
   r.plates = comma_list(entry("plates"));
   r.leave_out = comma_list(value_or(file.metadata, "leave_out"));
   r.rate_hz = file.input.rate_hz;
+  r.delay_s = file.input.delay_s;
   r.range = file.input.scaling;
   r.per_window = file.input.scaling.per_window;
   if (file.metadata.contains("interval_factor") && !file.metadata.contains("interval_factor_found"))

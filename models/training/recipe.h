@@ -38,6 +38,7 @@ struct Recipe : TrainingPace {
   /// epoch that draws it best is kept. Training ends when five epochs have brought no better one.
   bool keeps_best = false;
   double rate_hz = 300;            ///< of the model's samples, 20 to 2000
+  double delay_s = 0;              ///< of pictures: as WindowSettings, less than the window
   std::int64_t stride = 1;         ///< every stride-th frame of a pass ends a window
   std::optional<Scaling> range;    ///< rest and span; empty: SignalRange::fitted()
   bool per_window = true;          ///< whether a window is brought to its own rest and gain

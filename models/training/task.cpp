@@ -57,6 +57,7 @@ WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std:
   w.timesteps = static_cast<int>(recipe.model.timesteps);
   w.scale = static_cast<int>(recipe.model.scale);
   w.rate_hz = recipe.rate_hz;
+  w.delay_s = recipe.delay_s;
   w.stride = static_cast<int>(recipe.stride);
   const SignalRange range =
       SignalRange::of_folder(folders.data, recipe.plates, watch(folders.data), recipe.range.has_value());

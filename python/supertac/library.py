@@ -163,8 +163,9 @@ class LiveWindow:
 
 
 class SurfaceMap:
-    """One map of the whole surface that was felt, as --map of the programs: add() every picture with its place, then
-    cells() gives values and errors [height,width], NaN where nothing was felt, and (x, y) of the first cell's corner in mm.
+    """One map of the whole surface that was felt, as --map of the programs: add() every picture with its place (that of
+    the model's input["delay_s"] ago, where there is one), then cells() gives values and errors [height,width], NaN where
+    nothing was felt, and (x, y) of the first cell's corner in mm.
     """
 
     def __init__(self, model: Model):

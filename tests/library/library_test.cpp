@@ -35,8 +35,9 @@ class Library : public testing::Test {
     const SuperTac network(settings, rng);
     ActivationRanges ranges;
     ranges.add(network, uniform(network.input_shape(16), 5));
-    std::map<std::string, std::string> metadata = model_metadata(
-        network.settings(), {.rate_hz = 50, .scaling = {.per_window = true}, .filter_s = 0.05});
+    std::map<std::string, std::string> metadata =
+        model_metadata(network.settings(),
+                       {.rate_hz = 50, .scaling = {.per_window = true}, .filter_s = 0.05, .delay_s = 0.1});
     write_checkpoint(path_, network.parameters(), metadata, {ranges.stored()});
     file_ = load_model(path_);
   }
@@ -87,6 +88,7 @@ TEST_F(Library, DescribesTheModel) {
   EXPECT_EQ(about.pixel_mm[0], 0.75);
   EXPECT_EQ(about.pixel_mm[1], 0.75);
   EXPECT_EQ(about.filter_s, 0.05);
+  EXPECT_EQ(about.delay_s, 0.1);
   supertac_description older{};
   older.size = offsetof(supertac_description, rate_hz);
   ASSERT_EQ(supertac_describe(model.get(), &older), 0);

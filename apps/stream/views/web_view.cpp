@@ -2,8 +2,12 @@
 
 #include "apps/web/encode.h"
 #include "apps/web/pages.h"
+#include "data/map/elements.h"
+#include "hardware/ports/serial_port.h"
 
 namespace supertac {
+
+constexpr double kSurfaceEveryS = 1;
 
 WebView::WebView(const WebAddress& address, const WebSource& source, Recorder& recorder)
     : source_(source), recorder_(recorder), server_(address, site()) {}
@@ -30,6 +34,8 @@ bool WebView::update(const LiveState& state, const SurfaceMap* map, const MapReg
   untold_ = tell_all_ ? map->felt() : untold_.with(changed);
   tell_all_ = false;
   newest_->map = map->cells(untold_);
+  if (const double now = monotonic_seconds(); now - surface_s_ >= kSurfaceEveryS)
+    surface_s_ = now, surface_ = map->cells(map->felt());
   return true;
 }
 
@@ -48,6 +54,7 @@ std::string WebView::hello() {
                  {"names_textures", source_.names_textures},
                  {"unit", source_.unit},
                  {"draws", source_.draws},
+                 {"delay_s", source_.delay_s},
                  {"silent", source_.silent},
                  {"found", source_.found},
                  {"channels", source_.array.channels},
@@ -56,11 +63,14 @@ std::string WebView::hello() {
 
 std::string WebView::news() {
   std::optional<LiveState> state;
+  MapCells surface;
   {
     const std::lock_guard lock(mutex_);
     state.swap(newest_);
     untold_ = {};
+    if (state) std::swap(surface, surface_);
   }
+  if (!surface.region.empty()) state->surface = source_.surface(std::move(surface));
   return state ? web_event(*state, recorder_.status()) : std::string();
 }
 
@@ -94,6 +104,13 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
                     {"width", r.width},
                     {"values", levels_base64(state.map.values)},
                     {"felt", base64(felt)}};
+  }
+  if (state.surface) {
+    event["elements"] = {{"text", elements_text(*state.surface)}, {"rows", nlohmann::json::array()}};
+    for (const Element& element : elements(*state.surface))
+      for (auto& row = event["elements"]["rows"].emplace_back();
+           const auto& [name, value] : numbers_of(element))
+        row[name] = value;
   }
   return dumped(event);
 }

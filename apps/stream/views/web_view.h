@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -19,10 +20,12 @@ struct WebSource {
   TaxelArray array;
   int scale = 4;
   bool predicts_error = false, names_textures = false;
-  std::string unit = {};                ///< of the signals
-  bool draws = false;                   ///< there is a model
-  std::vector<int> silent = {};         ///< taxels that say nothing
-  std::vector<std::string> found = {};  ///< by a probe, a line each
+  std::string unit = {};                           ///< of the signals
+  bool draws = false;                              ///< there is a model
+  double delay_s = 0;                              ///< of its pictures
+  std::vector<int> silent = {};                    ///< taxels that say nothing
+  std::vector<std::string> found = {};             ///< by a probe, a line each
+  std::function<NamedMap(MapCells)> surface = {};  ///< what the map's cells say; from another thread
 };
 
 /// Serves live_page() with the newest state, 30 times a second at most, from a thread of its own.
@@ -53,7 +56,9 @@ class WebView {
   std::optional<LiveState> newest_;
   MapRegion untold_;  // of the map
   bool tell_all_ = true;
-  WebServer server_;  // last: its thread uses the others
+  double surface_s_ = 0;  // when all of it was taken
+  MapCells surface_;      // empty: told already
+  WebServer server_;      // last: its thread uses the others
 };
 
 /// The event of a state, one line of JSON; pictures as levels_base64().

@@ -49,7 +49,8 @@ function onHello(hello) {
   element("source").textContent = hello.source;
   element("felt-size").textContent = `${hello.rows} × ${hello.columns} taxels, ${sizeText(hello.pitch_mm)} mm apart`;
   element("drawn-size").textContent =
-    `${hello.rows * hello.scale} × ${hello.columns * hello.scale} pixels of ${sizeText(hello.pixel_mm)} mm`;
+    `${hello.rows * hello.scale} × ${hello.columns * hello.scale} pixels of ${sizeText(hello.pixel_mm)} mm` +
+    (hello.delay_s > 0 ? `, as it was ${hello.delay_s} s ago` : "");
   for (const id of ["texture-name", "texture"]) element(id).hidden = !hello.names_textures;
   element("guess-line").hidden = !hello.predicts_error;
   element("sure").hidden = !hello.predicts_error;
@@ -60,6 +61,7 @@ function onHello(hello) {
   element("profile").hidden = element("profile").previousElementSibling.hidden = !hello.draws;
   element("rate-name").textContent = hello.draws ? "pictures" : "frames";
   element("slide").hidden = true;
+  showElements({text: "", rows: []});
   for (const button of document.querySelectorAll("nav button")) button.disabled = false;
   surface.clear();
   ended = null;
@@ -74,6 +76,7 @@ function onPicture(event) {
     element("slide").hidden = false;
     mend(event.map);
   }
+  if (event.elements) showElements(event.elements);
   supertac.newest = event;
 }
 
@@ -178,6 +181,19 @@ function showFiles(names) {
     link.textContent = name;
     item.append(link);
     return item;
+  }));
+}
+
+function showElements({text, rows}) {
+  element("elements-text").textContent = text;
+  element("elements").hidden = rows.length === 0;
+  const off = (value, half) => `${value.toFixed(1)} ± ${half.toFixed(1)}`;
+  element("elements").querySelector("tbody").replaceChildren(...rows.map((e, i) => {
+    const row = document.createElement("tr");
+    const cells = [i + 1, off(e.x_mm, e.x_off_mm), off(e.y_mm, e.y_off_mm), `${e.height.toFixed(2)} ± ${e.height_off.toFixed(2)}`,
+                   `${e.open ? "≥ " : ""}${e.length_mm.toFixed(1)} × ${e.width_mm.toFixed(1)}`];
+    row.append(...cells.map((cell) => Object.assign(document.createElement("td"), {textContent: cell})));
+    return row;
   }));
 }
 

@@ -76,14 +76,16 @@ TEST_F(Streaming, ARecordingGivesThePicturesOfItsWindows) {
 }
 
 TEST_F(Streaming, TheMapOfARecordingHasTheBitsOfTheWindowsMap) {
+  constexpr double kDelayS = 0.02;  // each picture is of the place where the finger was then
   const Recording recording = record(40);
+  write_model(model(), kTimesteps, SimulatorSettings().filter_s, kDelayS);
   ASSERT_EQ(stream("--recording recording --out out --map map.safetensors").code, 0);
   const SafetensorsFile out = kept("out"), map = kept("map.safetensors");
   const std::vector<float> pictures = out.f32("pictures");
   const std::vector<double> times = out.f64("time_s");
   SurfaceMap expected(load_model(model()).windows().array->picture(2));
   for (std::size_t i = 0, frame = 0; i < times.size(); ++i) {
-    while (recording.time_s[frame] - recording.time_s[0] < times[i] - 1e-9) ++frame;
+    while (recording.time_s[frame + 1] - recording.time_s[0] < times[i] - kDelayS + 1e-9) ++frame;
     if (!recording.lift_mm.empty() && recording.lift_mm[frame] > kLiftedMm) continue;
     expected.add(recording.position_mm[2 * frame], recording.position_mm[2 * frame + 1],
                  std::span(pictures).subspan(64 * i, 64), {});

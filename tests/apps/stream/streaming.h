@@ -22,10 +22,10 @@ constexpr std::uintmax_t kTwoSeconds = 330'000;  // bytes of a capture
 
 // A model of random weights: what it draws means nothing, but it is the same on every way.
 inline void write_model(const std::string& path, Dim timesteps = kTimesteps,
-                        std::optional<double> filter_s = 0.0) {
+                        std::optional<double> filter_s = 0.0, double delay_s = 0) {
   Rng rng(1);
   const SuperTac model({.timesteps = timesteps, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1}, rng);
-  save_model(path, model, {300, {}, filter_s}, {});
+  save_model(path, model, {.filter_s = filter_s, .delay_s = delay_s}, {});
 }
 
 inline RigSettings touching_rig() {

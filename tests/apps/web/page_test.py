@@ -99,8 +99,8 @@ class Rig:
 class Stream:
     """supertac-stream with a page at the given port (0: any)."""
 
-    def __init__(self, binaries, rig, folder, out, port=0):
-        command = [binaries / "supertac-stream", "--board", rig.board, "--model", folder / "model.safetensors"]
+    def __init__(self, binaries, source, folder, out, port=0):
+        command = [binaries / "supertac-stream", *source, "--model", folder / "model.safetensors"]
         command += ["--out", out, "--web", str(port), "--force", "--classifier", folder / "classifier.safetensors"]
         self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=folder)
         self.url = next(m[1] for line in self.process.stderr if (m := re.search(r"live page: (\S+)", line)))
@@ -210,6 +210,21 @@ def check_record(browser, folder):
     assert 1 < header["volts"]["shape"][0] < 20000 and metadata["kind"] == "recording", metadata
 
 
+def check_elements(binaries, folder, browser, screenshots):
+    """Where places are known, the map's elements stand in a table as wide as a phone has room for."""
+    recording = next((folder / "data").glob("*.safetensors"))
+    stream = Stream(binaries, ["--recording", recording], folder, folder / "slide.safetensors")
+    browser.look(400, 1800)
+    browser.open(stream.url)
+    wait_until("the end", lambda: text(browser, "said") == "the run has ended")
+    count = int(re.match(r"\d+", text(browser, "elements-text"))[0])
+    assert count > 0 and count == browser.js("return document.querySelectorAll('#elements tbody tr').length"), count
+    assert browser.js("return element('elements').scrollWidth <= element('elements').clientWidth")
+    if screenshots:
+        (screenshots / "elements.png").write_bytes(browser.screenshot())
+    stream.process.wait(200)
+
+
 def check_snapshot(browser, folder):
     """S saves a PNG with both pictures: in its right half lie the drawn picture's colours."""
     browser.press("s")
@@ -292,7 +307,7 @@ def check_page(binaries, folder, browser, screenshots):
         rig = Rig(binaries, folder)
         stack.callback(rig.stop)
         log = folder / "seen.safetensors"
-        stream = Stream(binaries, rig, folder, log)
+        stream = Stream(binaries, ["--board", rig.board], folder, log)
         stack.callback(stream.process.kill)
         browser.look(1280, 860)
         browser.open(stream.url)
@@ -317,7 +332,7 @@ def check_page(binaries, folder, browser, screenshots):
             assert len(set(expected)) > 20, f"picture {number} shows nothing"
             wrong = [i for i, pair in enumerate(zip(colours, expected)) if pair[0] != pair[1]]
             assert not wrong, f"picture {number}: pixels {wrong[:9]}: {colours[wrong[0]]}, expected {expected[wrong[0]]}"
-        again = Stream(binaries, rig, folder, log, int(stream.url.rsplit(":", 1)[1]))
+        again = Stream(binaries, ["--board", rig.board], folder, log, int(stream.url.rsplit(":", 1)[1]))
         stack.callback(again.process.kill)
         wait_until("the page comes back by itself", lambda: text(browser, "link") == "live" and shown(browser) > 0)
         browser.press("z")
@@ -346,6 +361,7 @@ def main():
         make_lively(folder / "model.safetensors")
         with Browser(*programs, folder) as browser:
             check_page(binaries, folder, browser, screenshots)
+            check_elements(binaries, folder, browser, screenshots)
             check_probe(binaries, folder, browser, screenshots)
     print("the page does what it says")
     return 0

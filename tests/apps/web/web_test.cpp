@@ -343,6 +343,19 @@ TEST(WebView, AnEventHoldsThePictureAndWhatIsKnownOfIt) {
   const std::uint8_t mask[] = {1, 0};
   EXPECT_EQ(event["map"]["felt"], base64(mask));
   EXPECT_EQ(event["map"]["values"], levels_base64(state.map.values));
+  EXPECT_FALSE(event.contains("elements"));
+  // One hill of nine cells, of which the middle is highest, at the left edge of what was felt.
+  state.surface = {.name = "",
+                   .cells = {.region = {10, 20, 5, 5}, .values = std::vector<float>(25), .errors = {}},
+                   .cell_mm = 0.75};
+  for (const int cell : {5, 6, 7, 10, 11, 12, 15, 16, 17})
+    state.surface->cells.values[cell] = cell == 11 ? 1 : 0.75;
+  const auto told = parse_json_limited(web_event(state, {}))["elements"];
+  EXPECT_EQ(told["text"], "1 element");
+  ASSERT_EQ(told["rows"].size(), 1U);
+  EXPECT_NEAR(told["rows"][0]["x_mm"].get<double>(), 11.5 * 0.75, 1e-6);
+  EXPECT_NEAR(told["rows"][0]["y_mm"].get<double>(), 22.5 * 0.75, 1e-6);
+  EXPECT_EQ(told["rows"][0]["open"], 1);
 }
 
 }  // namespace

@@ -97,8 +97,9 @@ TEST(Elements, WhatWasNotFeltDoesNotExist) {
 
 TEST(Elements, OfAnEmptyOrFlatMapAreNone) {
   EXPECT_TRUE(elements(NamedMap{.name = "", .cells = {}, .cell_mm = kCellMm}).empty());
-  const std::vector<Element> none = elements(map_of("plain", kPlate));
-  EXPECT_TRUE(none.empty());
+  NamedMap none = map_of("plain", kPlate);
+  recognise(none, kinds_of_elements(kAnyKind));
+  EXPECT_TRUE(elements(none).empty());
   EXPECT_EQ(elements_text(none), "0 elements");
 }
 
@@ -119,7 +120,7 @@ TEST(Elements, AreDrawnAsTheirKindWhateverTheirWidth) {
     map.truth = map_of(there, kPlate).truth;
     EXPECT_GT(furthest(map), 0.5F) << felt;
     map.cells.values[5] = std::numeric_limits<float>::quiet_NaN();
-    draw_as(map, kind_of_elements(kind));
+    draw_as(map, kinds_of_elements(kind));
     EXPECT_TRUE(std::isnan(map.cells.values[5]) && std::isnan(map.cells.errors[5]));
     map.cells.values[5] = map.truth[5];
     EXPECT_LT(furthest(map), 0.07F) << felt;
@@ -128,10 +129,28 @@ TEST(Elements, AreDrawnAsTheirKindWhateverTheirWidth) {
   }
 }
 
+TEST(Elements, AreOfTheKindThatDiffersLeast) {
+  for (const auto& [plate, kind] :
+       {std::pair("3_Bumps", "bumps"), std::pair("6_Bumps", "bumps"), std::pair("4_Ridges", "ridges"),
+        std::pair("6_Ridges", "ridges"), std::pair("blobs12h2.5", "blobs")}) {
+    NamedMap map = map_of(plate, kPlate, 0.3F);
+    const RandomStream random(1, 0);
+    for (std::size_t c = 0; c < map.truth.size(); ++c)
+      map.cells.values[c] += 0.2F * static_cast<float>(random.uniform(c) - 0.5);
+    recognise(map, kinds_of_elements(kAnyKind));
+    EXPECT_EQ(map.kind, kind) << plate;
+    EXPECT_GT(map.kind_share, 0.9) << plate;
+    recognise(map, kinds_of_elements(kind == std::string("ridges") ? "bumps" : "ridges"));
+    EXPECT_LT(map.kind_share, 0.7) << plate;
+    draw_as(map, kinds_of_elements(kAnyKind));
+    EXPECT_EQ(map.kind, kind) << plate;
+  }
+}
+
 TEST(Elements, TheirKindIsOneElementOnAFlatPlate) {
-  EXPECT_EQ(kind_of_elements("bumps").max_height(), 2.5);
+  EXPECT_EQ(kinds_of_elements("bumps")[0].max_height(), 2.5);
   for (const char* name : {"3_Bumps", "waves", "plain36", "bumps12"})
-    EXPECT_THROW(kind_of_elements(name), std::invalid_argument) << name;
+    EXPECT_THROW(kinds_of_elements(name), std::invalid_argument) << name;
 }
 
 TEST(Elements, HoldTheirPlaceWithinWhatTheySay) {

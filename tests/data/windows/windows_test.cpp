@@ -32,9 +32,32 @@ TEST(Windows, AreTheLastFramesOfAPass) {
   EXPECT_EQ(set.frame_of(3), 18U);
   for (std::size_t i = 0; i < window.size(); ++i)
     ASSERT_EQ(window[i], set.settings().scaling(recording.signals[3 * kTaxels + i]));
-  EXPECT_EQ(set.last_frame(3), std::vector<float>(window.end() - kTaxels, window.end()));
+  EXPECT_EQ(set.shown_frame(3), std::vector<float>(window.end() - kTaxels, window.end()));
   EXPECT_NEAR(set.position(3).y_mm, 30 + 18 * 10.0 / 300, 1e-4);
   EXPECT_EQ(set.position(3).x_mm, 18);
+}
+
+TEST(Windows, ShowWhereTheFingerWasTheirDelayAgo) {
+  constexpr std::size_t kFrames = 5;
+  WindowSettings settings = wide_settings(16);
+  WindowSet now(settings);
+  settings.delay_s = kFrames / 300.0;
+  WindowSet later(settings);
+  Recording measured = make_recording({.pass = 2});
+  measured.truth_height = measured.truth_width = 16;
+  for (std::size_t i = 0; i < 100 * 256; ++i) measured.truth.push_back(static_cast<float>(i / 256) / 100);
+  for (WindowSet* set : {&now, &later}) set->add(make_recording({})), set->add(measured);
+  ASSERT_EQ(later.size(), now.size());
+  std::vector<float> a(256), b(256);
+  for (std::size_t i = kFrames; i < now.size(); ++i) {
+    if (i >= 85 && i < 85 + kFrames) continue;  // of the pass before
+    EXPECT_EQ(later.window(i), now.window(i));
+    EXPECT_EQ(later.position(i).y_mm, now.position(i - kFrames).y_mm);
+    EXPECT_EQ(later.shown_frame(i), now.shown_frame(i - kFrames));
+    now.truth(i - kFrames, a), later.truth(i, b);
+    ASSERT_EQ(a, b) << i;
+  }
+  EXPECT_NE(later.fingerprint(), now.fingerprint());
 }
 
 TEST(Windows, NeverCrossTheEdgeOfAPass) {
@@ -145,7 +168,7 @@ TEST(Windows, OfAnyArray) {
   EXPECT_EQ(set.array(), settings.array);
   EXPECT_EQ(set.image(), (ImageGrid{24, 24, 0.5}));
   EXPECT_EQ(set.window(0).size(), 32U * 36);
-  EXPECT_EQ(set.last_frame(5).size(), 36U);
+  EXPECT_EQ(set.shown_frame(5).size(), 36U);
   std::vector<float> truth(576), expected(576);
   for (std::size_t i = 0; i < set.size(); i += 97) {
     if (set.zone(i) == Zone::air) continue;
@@ -210,6 +233,7 @@ TEST(Windows, RefuseSettingsOutOfRange) {
       {{.scale = 3}, "scale must be 2, 4, 8 or 16, got 3"},
       {{.timesteps = 0}, "timesteps must be at least 1, got 0"},
       {{.stride = 0}, "stride must be at least 1, got 0"},
+      {{.timesteps = 60, .delay_s = 0.2}, "what is shown must lie in the window, got a delay of 0.2 s"},
       {{.rate_hz = 0},
        "rate_hz and max_gap_s must be positive, span not 0, got 0.000000, 0.050000 and 0.360000"}};
   for (const auto& [settings, refusal] : cases)

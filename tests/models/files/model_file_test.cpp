@@ -20,7 +20,9 @@ TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
   settings.grouping = Grouping::vertical;
   settings.last_frame_path = true;
   const SuperTac model = random_network(settings);
-  save_model(folder / "m.safetensors", model, {300, {2.5, 0.4, true}, 0.0992}, {{"split", "trial"}});
+  save_model(folder / "m.safetensors", model,
+             {.rate_hz = 300, .scaling = {2.5, 0.4, true}, .filter_s = 0.0992, .delay_s = 0.06},
+             {{"split", "trial"}});
   const ModelFile file = load_model(folder / "m.safetensors");
   EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
   EXPECT_EQ(file.model->settings().latent, 3);
@@ -28,6 +30,7 @@ TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
   EXPECT_EQ(file.input.scaling.rest, 2.5);
   EXPECT_TRUE(file.input.scaling.per_window);
   EXPECT_EQ(file.input.filter_s, 0.0992);
+  EXPECT_EQ(file.windows().delay_s, 0.06);
   EXPECT_EQ(file.metadata.at("split"), "trial");
   const Tensor x = uniform({2, 32, 16}, 1), a = model.infer(x), b = file.model->infer(x);
   EXPECT_TRUE(std::ranges::equal(a.values(), b.values()));
@@ -47,6 +50,7 @@ TEST(ModelFile, KeepsTheArrayAndSaysNothingOfTheRigs) {
   const auto rigs = model_metadata(small_settings(), {});
   EXPECT_EQ(rigs.at("settings").find("rows"), std::string::npos);
   EXPECT_EQ(rigs.at("input").find("pitch"), std::string::npos);
+  EXPECT_EQ(rigs.at("input").find("delay"), std::string::npos);
 }
 
 // A file of version 1, to be read for ever: settings, names, layouts and what they compute.

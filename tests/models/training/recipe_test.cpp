@@ -13,7 +13,8 @@ namespace {
 
 // What a model trained by this recipe says of itself.
 ModelFile file_of(const Recipe& recipe, const std::string& path) {
-  InputSettings input{.rate_hz = recipe.rate_hz, .scaling = recipe.range.value_or(Scaling())};
+  InputSettings input{
+      .rate_hz = recipe.rate_hz, .scaling = recipe.range.value_or(Scaling()), .delay_s = recipe.delay_s};
   input.scaling.per_window = recipe.per_window;
   save_model(path, random_network(recipe.model), input, metadata_of(recipe));
   return load_model(path);
@@ -32,7 +33,8 @@ TEST(Recipe, ComesBackFromTheModelFile) {
     recipe.loss.lambda = 0.25;
     recipe.plates = {"3_Bumps", "4_Ridges"}, recipe.leave_out = {"4_Ridges"};
     recipe.split = SplitKind::texture;
-    recipe.stride = 4, recipe.random_plates = 9, recipe.interval_factor = PixelInterval{0.5, 3};
+    recipe.delay_s = 0.5, recipe.stride = 4, recipe.random_plates = 9,
+    recipe.interval_factor = PixelInterval{0.5, 3};
     recipe.range = Scaling{.rest = 2, .span = 0.5};
     recipe.augment.dropped = 1, recipe.mirror = true;
     const std::string path = folder / (std::string(name) + ".safetensors");
@@ -40,6 +42,7 @@ TEST(Recipe, ComesBackFromTheModelFile) {
     EXPECT_EQ(metadata_of(back), metadata_of(recipe)) << name;
     EXPECT_EQ(model_metadata(back.model, {}), model_metadata(recipe.model, {})) << name;
     EXPECT_EQ(back.rate_hz, recipe.rate_hz);
+    EXPECT_EQ(back.delay_s, 0.5);
     EXPECT_EQ(back.range->span, 0.5);
     EXPECT_EQ(back.sampling, recipe.sampling);
     EXPECT_EQ(back.muon, recipe.muon);
@@ -69,6 +72,8 @@ TEST(Recipe, RefusesWhatNoTrainingHas) {
     return what_of<std::invalid_argument>([&] { recipe.check(); });
   };
   EXPECT_EQ(message([](Recipe& r) { r.stride = 0; }), "recipe: expected stride from 1 to 100000, got 0");
+  EXPECT_EQ(message([](Recipe& r) { r.delay_s = 2.56; }),
+            "recipe: expected a delay from 0 to less than the window, got 2.56");
   EXPECT_EQ(message([](Recipe& r) { r.rate_hz = 5; }), "recipe: expected rate_hz from 20 to 2000, got 5");
   EXPECT_EQ(message([](Recipe& r) { r.random_plates = -1; }),
             "recipe: expected random_plates from 0 to 50000, got -1");
