@@ -22,32 +22,20 @@ void declare(Arguments& a) {
       "picture; "
       "training FILE --data DIR: repeats "
       "parts of a training that kept a ledger; step FILE --data DIR --at N: opens one step of it, with every "
-      "operator; picture FILE --recording FILE --at S --out FILE: writes one picture with every array on the "
-      "way to it; "
-      "ledgers FILE OTHER: the first difference of two, or of two steps that were opened with --json");
+      "operator; ledgers FILE OTHER: the first difference of two, or of two steps that were opened with "
+      "--json");
   a.positional("FILE", "what is checked", false);
   a.positional("OTHER", "what it is compared with", false);
-  a.option("break", "OP",
-           "gradients: plant errors in the reverse step of this op, or of 'all', one after the other: wrong "
-           "sign, doubled, without a term, at the wrong index; each has to be found");
-  a.flag("report", "bits: print the rows of docs/bits.md for this machine");
   a.option("data", "DIR", "training, step, chain: the recordings that the model was trained on");
   a.option("picture", "HEX", "chain: what the self-test said on the device, 16 digits");
   a.option("segments", "K", "training: how many of its twenty parts are repeated", "1");
   a.option("seed", "N", "training: draws them", "0");
-  a.option("at", "N",
-           "step: which one, from 1; picture: seconds on the recording's clock, the last window that ends by "
-           "then");
-  a.option("recording", "FILE", "picture: what was felt");
-  a.option("precision", "NAME",
-           "picture: of the maps that the programs' own drawing goes through, fp32 or int8", "fp32");
+  a.option("at", "N", "step: which one, from 1");
   a.option(
       "operator", "NAME",
       "step: the arrays of those whose name begins so are written to --out (3/ is the fourth micro-batch, "
       "update/ what the optimiser did)");
-  a.option("out", "FILE",
-           "step, picture: arrays as safetensors, which examples/referee.py, or recompute.py for a picture, "
-           "computes again with NumPy")
+  a.option("out", "FILE", "step: arrays as safetensors, which examples/referee.py computes again with NumPy")
       .writes();
 }
 
@@ -58,9 +46,7 @@ int check_gradients(const Arguments& a) {
   const std::string program =
       std::filesystem::read_symlink("/proc/self/exe").parent_path() / "supertac-check-gradients";
   std::vector<std::string> words{program};
-  for (const char* name : {"break", "json"}) {
-    if (a.given(name)) words.insert(words.end(), {std::string("--") + name, a.text(name)});
-  }
+  if (a.given("json")) words.insert(words.end(), {"--json", a.text("json")});
   for (const char* name : {"force", "quiet"})
     if (a.given(name)) words.push_back(std::string("--") + name);
   std::vector<char*> pointers;
@@ -77,18 +63,14 @@ void need(const Arguments& a, const std::string& name) {
 }  // namespace
 
 int run(Arguments& a) {
-  const std::string what = a.choice("WHAT", {"gradients", "bits", "machine", "udev", "file", "chain",
-                                             "training", "step", "picture", "ledgers"});
+  const std::string what = a.choice(
+      "WHAT", {"gradients", "bits", "machine", "udev", "file", "chain", "training", "step", "ledgers"});
   if (what == "gradients") return check_gradients(a);
   if (what == "bits") return check_bits(a);
   if (what == "machine") return check_machine(a);
   if (what == "udev") return print_udev_rule(a);
   need(a, "FILE");
   if (what == "file") return check_file(a);
-  if (what == "picture") {
-    for (const char* name : {"recording", "at", "out"}) need(a, name);
-    return check_picture(a);
-  }
   need(a, what == "ledgers" || what == "chain" ? "OTHER" : "data");
   if (what == "chain") return check_chain(a);
   if (what == "ledgers") return check_ledgers(a);

@@ -220,7 +220,7 @@ std::vector<std::uint32_t> windows_to_score(const Arguments& a, const WindowSet&
 }
 
 Json row_of(const Recipe& recipe, const TrainingRun& training, const ZoneMetrics& scores) {
-  const Network& model = training.trainer().model();
+  const SuperTac& model = training.trainer().model();
   SuperTacSettings s = recipe.model;
   set_array(s, training.task().windows->array());
   const Tensor window = Tensor::full(model.input_shape(1), real(0.5));

@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "autograd/record.h"
-#include "autograd/reverse_watch.h"
+#include "autograd/trace.h"
 
 namespace supertac {
 using detail::Node;
@@ -99,7 +98,7 @@ void visit(Node& node, Queue& queue) {
   }
   Backward b(node);
   if (reverse_watch != nullptr) {
-    reverse_watch->reverse(node.op, node.input_count, b, [&] { node.step(b); });
+    reverse_watch->reverse(b, [&] { node.step(b); });
   } else {
     node.step(b);
   }

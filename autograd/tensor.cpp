@@ -85,12 +85,9 @@ Tensor& Tensor::operator=(Tensor other) noexcept {
   return *this;
 }
 
-Tensor::~Tensor() { release(); }
-
-void Tensor::release() noexcept {
-  if (buffer_ == nullptr) return;
-  if (buffer_->users.fetch_sub(1, std::memory_order_acq_rel) == 1) pool_release(buffer_, buffer_->bytes);
-  buffer_ = nullptr;
+Tensor::~Tensor() {
+  if (buffer_ != nullptr && buffer_->users.fetch_sub(1, std::memory_order_acq_rel) == 1)
+    pool_release(buffer_, buffer_->bytes);
 }
 
 Tensor Tensor::clone() const {

@@ -86,7 +86,6 @@ class Tensor {
     std::atomic<std::int32_t> users;
     std::size_t bytes;
   };
-  void release() noexcept;
 
   Buffer* buffer_ = nullptr;
   real* values_ = nullptr;

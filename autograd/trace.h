@@ -1,14 +1,15 @@
 // Trace: records which ops ran, with which inputs and settings. CompiledModel networks are built from it
-// (models/inference/compiled/compiled_model.h), opened training steps list it
-// (models/training/audit/opened_step.h).
+// (models/inference/compiled/compiled_model.h). ReverseWatch: stands between backward() and the reverse
+// steps. Opened training steps list both (models/training/audit/opened_step.h).
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string_view>
 #include <vector>
 
 #include "autograd/kernels/conv.h"
-#include "autograd/variable.h"
+#include "autograd/record.h"
 
 namespace supertac {
 
@@ -35,7 +36,7 @@ class Trace {
  public:
   /// Throws std::logic_error where this thread has one already.
   Trace();
-  virtual ~Trace();
+  ~Trace();
   Trace(const Trace&) = delete;
   Trace& operator=(const Trace&) = delete;
 
@@ -45,12 +46,21 @@ class Trace {
   static void note(const char* op, const Variable& y, std::span<const Variable* const> inputs,
                    const OpSettings* settings);
 
- protected:
-  /// Called for each op before anything uses its result, which may be changed here.
-  virtual void noted(TracedOp&) {}
-
  private:
   std::vector<TracedOp> ops_;
+};
+
+/// While one lives, backward() of this thread hands every reverse step to it. One at a time.
+class ReverseWatch {
+ public:
+  /// Throws std::logic_error where this thread has one already.
+  ReverseWatch();
+  virtual ~ReverseWatch();
+  ReverseWatch(const ReverseWatch&) = delete;
+  ReverseWatch& operator=(const ReverseWatch&) = delete;
+
+  /// Must call `step`, which reads b.gy() and adds into the gradients of the op's inputs.
+  virtual void reverse(Backward& b, const std::function<void()>& step) = 0;
 };
 
 }  // namespace supertac

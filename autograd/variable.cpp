@@ -1,14 +1,12 @@
-// Variables, their nodes, and the trace of the ops that made them.
+// Variables, their nodes, the trace of the ops that made them, and how ops refuse arguments.
 #include "autograd/variable.h"
 
 #include <algorithm>
 #include <stdexcept>
 #include <string>
-#include <unordered_set>
 #include <utility>
 
 #include "autograd/kernels/fast/pool.h"
-#include "autograd/record.h"
 #include "autograd/trace.h"
 
 namespace supertac {
@@ -120,19 +118,6 @@ std::vector<Variable> inputs_of(const Variable& y) {
   return inputs;
 }
 
-std::vector<Variable> history_of(const Variable& y) {
-  std::vector<Variable> history{y};
-  std::unordered_set<const Node*> known{y.node()};
-  for (std::size_t i = 0; i < history.size(); ++i) {
-    for (const Variable& x : inputs_of(history[i])) {
-      if (known.insert(x.node()).second) history.push_back(x);
-    }
-  }
-  std::stable_sort(history.begin(), history.end(),
-                   [](const Variable& a, const Variable& b) { return a.node()->number < b.node()->number; });
-  return history;
-}
-
 static thread_local Trace* current = nullptr;
 
 Trace::Trace() {
@@ -148,10 +133,38 @@ void Trace::note(const char* op, const Variable& y, std::span<const Variable* co
   TracedOp& traced =
       current->ops_.emplace_back(TracedOp{op, y, {}, settings != nullptr ? *settings : OpSettings{}});
   for (const Variable* x : inputs) traced.inputs.push_back(*x);
-  current->noted(traced);
 }
 
 NoGrad::NoGrad() : before_(std::exchange(recording, false)) {}
 NoGrad::~NoGrad() { recording = before_; }
+
+void refuse(const char* op, const std::string& message) {
+  throw std::invalid_argument(std::string(op) + ": " + message);
+}
+
+void check_defined(const char* op, const char* argument, const Variable& x) {
+  if (!x.defined()) refuse(op, std::string(argument) + " expects a value, got an empty Variable");
+}
+
+void check_rank(const char* op, const char* argument, const Variable& x, int rank) {
+  check_defined(op, argument, x);
+  if (x.rank() == rank) return;
+  refuse(op, std::string(argument) + " expects rank " + std::to_string(rank) + ", got " + x.shape().text());
+}
+
+void check_shape(const char* op, const char* argument, const Variable& x, const Shape& expected) {
+  check_defined(op, argument, x);
+  if (x.shape() == expected) return;
+  refuse(op, std::string(argument) + " expects " + expected.text() + ", got " + x.shape().text());
+}
+
+void check_same_shape(const char* op, const char* a_name, const Variable& a, const char* b_name,
+                      const Variable& b) {
+  check_defined(op, a_name, a);
+  check_defined(op, b_name, b);
+  if (a.shape() == b.shape()) return;
+  refuse(op, std::string(a_name) + " and " + b_name + " must have the same shape, got " + a.shape().text() +
+                 " and " + b.shape().text());
+}
 
 }  // namespace supertac

@@ -83,10 +83,8 @@ class NoGrad {
   bool before_;
 };
 
-/// y and every value it was computed from, in the order of computation; leaves (inputs, parameters) come
-/// first. What backward() has freed is missing. For looking into a graph when something has gone wrong.
-std::vector<Variable> history_of(const Variable& y);
-/// The inputs of the op that made y; empty for a leaf and for what is not on a graph.
+/// The inputs of the op that made y; empty for a leaf, for what is not on a graph and behind backward(). For
+/// looking into a graph when something has gone wrong.
 std::vector<Variable> inputs_of(const Variable& y);
 
 }  // namespace supertac

@@ -26,12 +26,6 @@ std::vector<Variable> values_of(const std::vector<Parameter>& parameters) {
   return values;
 }
 
-std::vector<std::string> names_of(const std::vector<Parameter>& parameters) {
-  std::vector<std::string> names;
-  for (const Parameter& p : parameters) names.push_back(p.name);
-  return names;
-}
-
 Tensor uniform_fan_in(const Shape& shape, Dim fan_in, Rng& rng) {
   if (fan_in < 1) {
     throw std::invalid_argument(

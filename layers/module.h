@@ -67,8 +67,6 @@ class Module {
 
 /// The handles alone, for an optimiser.
 std::vector<Variable> values_of(const std::vector<Parameter>& parameters);
-/// The names alone, for check_gradients().
-std::vector<std::string> names_of(const std::vector<Parameter>& parameters);
 
 /// Uniform in [-1/sqrt(fan_in), 1/sqrt(fan_in)): what PyTorch draws for convolutions and linear layers
 /// (He et al. 2015 with a = sqrt(5)). Throws std::invalid_argument when fan_in < 1: a layer without inputs or

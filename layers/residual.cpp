@@ -18,8 +18,6 @@ Dim squeezed(Dim channels, Dim reduction) {
 }
 
 std::vector<Rcab> make_blocks(const RirbOptions& options, Rng& rng) {
-  if (options.blocks < 0)
-    throw std::invalid_argument("Rirb: blocks must be 0 or more, got " + std::to_string(options.blocks));
   std::vector<Rcab> blocks;
   for (Dim i = 0; i < options.blocks; ++i) blocks.emplace_back(options.channels, options.reduction, rng);
   return blocks;

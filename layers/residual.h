@@ -43,7 +43,7 @@ struct RirbOptions {
 /// x [N,H,W,C] -> [N,2H,2W,C]; up is a transposed convolution of kernel 4, stride 2, padding 1.
 class Rirb : public Module {
  public:
-  /// Throws std::invalid_argument for blocks < 0 and for a reduction that ChannelAttention refuses.
+  /// Throws as ChannelAttention.
   Rirb(const RirbOptions& options, Rng& rng);
   Variable forward(const Variable& x) const;
 

@@ -1,7 +1,4 @@
-#include <sys/utsname.h>
-
 #include <array>
-#include <fstream>
 
 #include "apps/check/check.h"
 #include "apps/common/command_line/program.h"
@@ -67,37 +64,6 @@ Bits bits_here() {
   return {short_hash(recording), short_hash(training), short_hash(pictures), short_hash(bytes)};
 }
 
-// What stands behind `key` and a separator in a file of lines; "unknown" where nothing does.
-std::string entry_of(const char* path, const std::string& key, char separator) {
-  std::ifstream in(path);
-  for (std::string line; std::getline(in, line);) {
-    const std::size_t at = line.find(separator);
-    if (!line.starts_with(key) || at == std::string::npos) continue;
-    const std::size_t begin = line.find_first_not_of(" \"", at + 1), end = line.find_last_not_of(" \"");
-    if (begin != std::string::npos) return line.substr(begin, end - begin + 1);
-  }
-  return "unknown";
-}
-
-// A row of docs/bits.md.
-std::string row_of(const std::string& kernels, const Bits& found) {
-#ifdef __clang__
-  const std::string compiler = "Clang " + std::string(__clang_version__);
-#else
-  const std::string compiler = "GCC " + std::string(__VERSION__);
-#endif
-  utsname system{};
-  ::uname(&system);
-  std::string processor = entry_of("/proc/cpuinfo", "model name", ':'), row = "|";
-  if (const std::string family = entry_of("/proc/cpuinfo", "cpu family", ':'); family != "unknown")
-    processor += ", family " + family + " model " + entry_of("/proc/cpuinfo", "model\t", ':');
-  for (const std::string& cell :
-       {processor + ", " + system.machine, kernels, compiler, entry_of("/etc/os-release", "PRETTY_NAME", '='),
-        found.recording, found.training, found.pictures, found.bytes})
-    row += " " + cell + " |";
-  return row;
-}
-
 }  // namespace
 
 int check_bits(const Arguments& a) {
@@ -121,15 +87,13 @@ int check_bits(const Arguments& a) {
       line +=
           std::string("  ") + what + " " + found.*member + (same ? " ok" : " expected " + kGolden.*member);
     }
-    a.print(a.flag("report") ? row_of(row["kernels"], found)
-                             : row["kernels"].get<std::string>() + ":" + line);
+    a.print(row["kernels"].get<std::string>() + ":" + line);
     rows.push_back(std::move(row));
   }
-  if (!a.flag("report") || wrong > 0)
-    a.print(wrong == 0 ? "the same bits on every path"
-                       : std::to_string(wrong) +
-                             " hashes differ: another version, or this processor or compiler computes "
-                             "otherwise");
+  a.print(wrong == 0
+              ? "the same bits on every path"
+              : std::to_string(wrong) +
+                    " hashes differ: another version, or this processor or compiler computes otherwise");
   a.write_json({{"paths", rows}, {"wrong", wrong}});
   return wrong == 0 ? kExitOk : kExitFailed;
 }

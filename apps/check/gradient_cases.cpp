@@ -10,7 +10,6 @@
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/losses.h"
-#include "autograd/ops/max_pool.h"
 #include "autograd/ops/shaping.h"
 #include "autograd/ops/vae.h"
 #include "layers/residual.h"
@@ -60,7 +59,8 @@ class Cases {
     std::vector<Parameter> parameters;
     std::copy_if(m->parameters().begin(), m->parameters().end(), std::back_inserter(parameters), asked);
     Leaves leaves = values_of(parameters);
-    GradientCheckOptions options{.max_entries_per_input = most, .names = names_of(parameters)};
+    GradientCheckOptions options{.max_entries_per_input = most};
+    for (const Parameter& parameter : parameters) options.names.push_back(parameter.name);
     const Variable input = x ? Variable(*x, true) : Variable();
     if (x) leaves.push_back(input), options.names.push_back("x");
     for (std::string& leaf : options.names) leaf = name + " " + leaf;
@@ -238,18 +238,6 @@ void supertac_losses(Cases& cases, const std::string& name, const SuperTacSettin
   cases.module<SuperTac>(name, with_larger_weights(std::make_shared<SuperTac>(s, rng)), {}, loss, 4, asked);
 }
 
-}  // namespace
-
-std::vector<GradientCase> op_cases() {
-  Cases cases("op");
-  elementwise(cases);
-  attention(cases);
-  convolutions(cases);
-  shaping(cases);
-  losses(cases);
-  return cases.take();
-}
-
 std::vector<GradientCase> layer_cases() {
   Cases cases("layer");
   Rng rng(1);
@@ -303,26 +291,18 @@ std::vector<GradientCase> loss_cases() {
   return cases.take();
 }
 
-CheckedGradients check(std::span<const GradientCase> cases) {
-  CheckedGradients all{.kind = cases.front().kind, .name = cases.front().name};
-  for (const GradientCase& c : cases) {
-    const GradientReport report = check_gradients(c.f, c.leaves, c.options);
-    if (all.entries == 0 || report.max_relative_error > all.worst.relative_error)
-      all.worst = report.worst.front();
-    all.entries += report.entries;
-  }
-  return all;
+}  // namespace
+
+std::vector<GradientCase> op_cases() {
+  Cases cases("op");
+  for (const auto& add : {elementwise, attention, convolutions, shaping, losses}) add(cases);
+  return cases.take();
 }
 
-std::vector<std::span<const GradientCase>> by_name(std::span<const GradientCase> cases) {
-  std::vector<std::span<const GradientCase>> runs;
-  while (!cases.empty()) {
-    const auto end = std::find_if(cases.begin(), cases.end(),
-                                  [&](const GradientCase& c) { return c.name != cases.front().name; });
-    runs.push_back(cases.first(static_cast<std::size_t>(end - cases.begin())));
-    cases = cases.subspan(runs.back().size());
-  }
-  return runs;
+std::vector<GradientCase> gradient_cases() {
+  std::vector<GradientCase> all = op_cases();
+  for (const auto& more : {layer_cases(), loss_cases()}) all.insert(all.end(), more.begin(), more.end());
+  return all;
 }
 
 }  // namespace supertac

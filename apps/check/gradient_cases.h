@@ -3,7 +3,6 @@
 #pragma once
 
 #include <functional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -20,20 +19,8 @@ struct GradientCase {
   std::function<Variable(const std::vector<Variable>&)> of{};  ///< of an op: f of any leaves
 };
 
-/// Cases of one name follow each other.
+/// All of them, and those of ops alone. Cases of one name follow each other.
+std::vector<GradientCase> gradient_cases();
 std::vector<GradientCase> op_cases();
-std::vector<GradientCase> layer_cases();
-std::vector<GradientCase> loss_cases();
-
-/// The cases of one name together.
-struct CheckedGradients {
-  std::string kind, name;
-  Dim entries = 0;
-  GradientEntry worst{};
-  bool wrong() const { return !(worst.relative_error <= kGradientTolerance); }
-};
-CheckedGradients check(std::span<const GradientCase> cases_of_one_name);
-/// Splits cases into runs of one name.
-std::vector<std::span<const GradientCase>> by_name(std::span<const GradientCase> cases);
 
 }  // namespace supertac

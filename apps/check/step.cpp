@@ -70,8 +70,7 @@ int check_step(const Arguments& a) {
   OpenedStep opened;
   if (!d) {
     d = training.make_step([&] {
-      opened = open_step(trainer,
-                         {.keep = a.given("operator") ? std::optional(a.text("operator")) : std::nullopt});
+      opened = open_step(trainer, a.given("operator") ? std::optional(a.text("operator")) : std::nullopt);
     });
   }
   while (!d && !training.line()) d = training.make_step();  // up to the line that holds it

@@ -29,7 +29,7 @@ std::vector<Segment> drawn(std::vector<Segment> segments, std::size_t count, std
 }
 
 // The model file has to hold the parameters of the last state.
-bool is_of(const std::string& model, const Network& network) {
+bool is_of(const std::string& model, const SuperTac& network) {
   const ModelFile file = load_model(model);
   const auto& a = network.parameters();
   const auto& b = file.model->parameters();

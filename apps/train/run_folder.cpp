@@ -103,50 +103,20 @@ constexpr Other kOthers[] = {
     {"PSNR of test pictures in contact, dB", [](const LogLine& l) { return l.test_psnr_db; }, false},
     {"Gradient norm before clipping", [](const LogLine& l) { return std::optional(l.gradient_norm); }, true}};
 
-// {"model": {"latent": 10}} as the rows model latent | 10; lists of words or numbers on one line.
-void add_facts(std::vector<std::pair<std::string, std::string>>& facts, const std::string& name,
-               const nlohmann::ordered_json& value) {
-  const auto words = [](std::string text) {
-    if (text == "spread") return std::string("predicted error");  // the key of old files
-    std::ranges::replace(text, '_', ' ');
-    return text;
-  };
-  if (value.is_object()) {
-    for (const auto& [key, part] : value.items())
-      add_facts(facts, (name.empty() ? "" : name + " ") + words(key), part);
-  } else if (value.is_array()) {
-    facts.emplace_back(name, joined(value, ", ", [](const nlohmann::ordered_json& part) {
-                         return part.is_string() ? part.get<std::string>() : part.dump();
-                       }));
-  } else if (value.is_boolean()) {
-    facts.emplace_back(name, value.get<bool>() ? "yes" : "no");
-  } else {
-    facts.emplace_back(name, value.is_string()         ? value.get<std::string>()
-                             : value.is_number_float() ? format(value.get<double>())
-                                                       : value.dump());
-  }
-}
-
-// One page with the learning curves, on linear and logarithmic axes, the other curves and the settings of a
-// run; it loads nothing from elsewhere.
-std::string report_page(const nlohmann::ordered_json& settings, const std::vector<LogLine>& lines) {
+// One page with the learning curves, on linear and logarithmic axes, and the other curves of a run; it loads
+// nothing from elsewhere.
+std::string report_page(const std::vector<LogLine>& lines) {
   std::string others;
   for (const Other& other : kOthers)
     others += chart_svg(other.title, {.label = "step"}, {.label = "", .logarithmic = other.logarithmic},
                         {curve("", lines, other.value)});
-  std::vector<std::pair<std::string, std::string>> facts;
-  nlohmann::ordered_json once = settings;
-  if (once.contains("provenance"))
-    for (const auto& [name, value] : settings.items()) once["provenance"].erase(name);
-  add_facts(facts, "", once);
   return result_page(
       "SuperTac training",
       page_section("Learning curves",
                    "training pictures are augmented and of whole passes, test pictures those in contact",
                    learning_curves(lines)) +
           page_section("Other curves", "means over the steps since the point before",
-                       "<div class=\"two\">" + others + "</div>") +
-          page_section("Settings", "", page_facts(facts)));
+                       "<div class=\"two\">" + others + "</div>"));
 }
 
 }  // namespace
@@ -191,8 +161,6 @@ bool RunFolder::log(const LogLine& line) {
   return !log_broken_;
 }
 
-void RunFolder::write_report(const nlohmann::ordered_json& settings) const {
-  write_file(path_ + "/report.html", report_page(settings, lines_));
-}
+void RunFolder::write_report() const { write_file(path_ + "/report.html", report_page(lines_)); }
 
 }  // namespace supertac

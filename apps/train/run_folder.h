@@ -28,7 +28,7 @@ class RunFolder {
   /// only.
   bool log(const LogLine& line);
   /// A page with curves that needs no other file. Throws FileError.
-  void write_report(const nlohmann::ordered_json& settings) const;
+  void write_report() const;
   static std::string folder_of(const std::string& model_file);
 
  private:

@@ -90,17 +90,17 @@ void TrainingRun::write_end() {
     if (task_.finds_interval_factor && origin.contains("interval_factor"))
       a_.note("intervals of " + origin.at("interval_factor") +
               " (--interval-factor) hold 90 % of the tested groups' pixels at each height of the truth");
-    if (const TrainingState& state = trainer_.state(); state.best_epoch() > 0)
-      a_.note("the network of epoch " + std::to_string(state.best_epoch()) + " of " +
+    if (trainer_.best_epoch() > 0)
+      a_.note("the network of epoch " + std::to_string(trainer_.best_epoch()) + " of " +
               std::to_string(trainer_.step() / trainer_.steps_per_epoch()) +
               " is kept: it drew the group that was held out best (contact SSIM " +
-              format(state.best_score(), 3) + ")");
+              format(trainer_.best_score(), 3) + ")");
     save_trained(trainer_, finished, origin);
     target_.out.path = publish(finished, target_.out);
     description_["content"] = hash_of_file(target_.out.path);
   }
   folder_->write_settings(description_);
-  folder_->write_report(description_);
+  folder_->write_report();
 }
 
 TrainingCallbacks TrainingRun::callbacks(Progress& progress) {

@@ -1,7 +1,7 @@
 // Convolution and transposed convolution over a batch, with both gradients, callable without a graph.
 // Everything is channels-last: the channels of one pixel lie side by side. "= or +=" is what `into` says.
 // Nothing is checked, and no result may overlap an input; autograd/ops/convolution.h refuses what is wrong.
-// The products of a linear layer stand in autograd/ops/linear.h, the sums of SSIM in kernels/ssim.h.
+// The products of a linear layer stand in autograd/ops/linear.h.
 #pragma once
 
 #include <compare>

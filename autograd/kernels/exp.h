@@ -10,9 +10,8 @@
 namespace supertac::kernels {
 
 #ifdef SUPERTAC_REAL_IS_DOUBLE
-inline double exp_same_bits(double x) {
-  return std::exp(x);
-}  // the double build checks gradients, it makes no promise
+// The double build checks gradients, it makes no promise.
+inline double exp_same_bits(double x) { return std::exp(x); }
 #else
 /// Relative error below 2e-7; x is limited to [-87, 88], where the result is normal and finite.
 inline float exp_same_bits(float x) {

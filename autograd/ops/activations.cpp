@@ -1,6 +1,5 @@
 #include "autograd/ops/activations.h"
 
-#include "autograd/checks.h"
 #include "autograd/kernels/conv.h"
 #include "autograd/kernels/exp.h"
 #include "autograd/ops/elementwise.h"

@@ -1,6 +1,5 @@
 #include "autograd/ops/attention.h"
 
-#include "autograd/checks.h"
 #include "autograd/ops/elementwise.h"
 
 namespace supertac {

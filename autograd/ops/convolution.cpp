@@ -1,7 +1,7 @@
 #include "autograd/ops/convolution.h"
 
-#include "autograd/checks.h"
 #include "autograd/kernels/conv.h"
+#include "autograd/record.h"
 #include "autograd/trace.h"
 
 namespace supertac {

@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "autograd/checks.h"
 #include "autograd/kernels/fast/each.h"
 #include "autograd/record.h"
 #include "autograd/trace.h"

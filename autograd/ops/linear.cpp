@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/checks.h"
 #include "autograd/kernels/fast/conv.h"
 #include "autograd/kernels/fast/isa/isa.h"
+#include "autograd/record.h"
 #include "autograd/trace.h"
 
 namespace supertac {

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/checks.h"
 #include "autograd/kernels/exp.h"
-#include "autograd/kernels/ssim.h"
 #include "autograd/ops/elementwise.h"
 
 namespace supertac {
@@ -27,28 +25,6 @@ Variable l2_loss(const Variable& x, const Variable& target) {
     add_to_gradient(g, 0, [=](Dim i) { return each_part * (from[i] - to[i]); });
     add_to_gradient(g, 1, [=](Dim i) { return each_part * (to[i] - from[i]); });
   });
-}
-
-// x, target [N,H,W,1];  value = mean over images and positions of SSIM (autograd/kernels/ssim.h)
-// gx = gy d value / dx; the target is a constant
-Variable ssim(const Variable& x, const Tensor& target) {
-  check_rank("ssim", "x", x, 4);
-  if (target.shape() != x.shape()) {
-    refuse("ssim", "x and target must have the same shape, got " + x.shape().text() + " and " +
-                       target.shape().text());
-  }
-  if (x.dim(0) < 1 || x.dim(3) != 1 || std::min(x.dim(1), x.dim(2)) < kernels::kSmallestSsimImage) {
-    refuse("ssim", "x expects [N,H,W,1] with H, W >= 3, got " + x.shape().text());
-  }
-  const kernels::ImageSizes sizes{x.dim(0), x.dim(1), x.dim(2)};
-  const double value = kernels::ssim(sizes, x.value().data(), target.data());
-  const auto reverse = [sizes, target](Backward& g) {
-    if (Tensor* gx = g.grad_of(0)) {
-      kernels::ssim_grad(sizes, g.gy().item(), g.value(0).data(), target.data(), gx->data());
-    }
-  };
-  const OpSettings settings{.constant = target};
-  return record("ssim", Tensor::full({}, static_cast<real>(value)), {&x}, reverse, &settings);
 }
 
 // -log softmax(logits)[label] of one row of classes; `rest` becomes softmax(logits) - onehot(label), its

@@ -9,7 +9,6 @@
 
 #include "autograd/kernels/fast/each.h"
 #include "autograd/kernels/fast/pool.h"
-#include "autograd/kernels/sums.h"
 #include "autograd/ops/linear.h"
 
 namespace supertac {
@@ -50,6 +49,10 @@ void move_matrix(const Shape& shape, real clip, double rate, const real* gradien
   kernels::each(n, [=](Dim i) { x[i] += -length * to[i]; });
 }
 
+double sum_of_squares(Dim n, const real* x) {
+  return kernels::sum_of(n, [=](Dim i) { return static_cast<double>(x[i]) * static_cast<double>(x[i]); });
+}
+
 // The last bits of the C library's pow depend on the processor; products do not.
 double power(double base, std::int64_t exponent) {
   double result = 1;
@@ -70,7 +73,7 @@ void orthogonalise(Dim rows, Dim columns, real* x) {
   Scratch<real> start(static_cast<std::size_t>(size)), squares(static_cast<std::size_t>(5 * square));
   real* const from = start.data();
   real *s = squares.data(), *p = s + square, *q = p + square, *next = q + square, *spare = next + square;
-  const auto factor = static_cast<real>(1 / (std::sqrt(kernels::sum_of_squares(size, x)) + 1e-7));
+  const auto factor = static_cast<real>(1 / (std::sqrt(sum_of_squares(size, x)) + 1e-7));
   kernels::each(size, [=](Dim i) { from[i] = factor * x[i]; });
   if (wide) {
     kernels::linear_grad_x(rows, rows, columns, from, from, Into::overwrite, s);
@@ -165,7 +168,7 @@ double Adam::step() {
   }
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t k = 0; k < parameters_.size(); ++k)
-    squares_[k] = kernels::sum_of_squares(parameters_[k].size(), parameters_[k].grad().data());
+    squares_[k] = sum_of_squares(parameters_[k].size(), parameters_[k].grad().data());
   const double squares = std::accumulate(squares_.begin(), squares_.end(), 0.0);
   const double norm = std::sqrt(squares);
   if (!std::isfinite(norm)) return norm;

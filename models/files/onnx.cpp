@@ -223,7 +223,7 @@ void Exporter::output(const char* name, const Variable& y, const char* about) {
 }
 
 std::string Exporter::picture_of(const ModelFile& file) {
-  const Network& network = *file.model;
+  const SuperTac& network = *file.model;
   for (const Parameter& p : network.parameters()) parameters_.emplace(p.value.node(), to_stored(p));
   const TracedPrediction traced(network, Tensor::zeros(network.input_shape(1)));
   const Prediction& drawn = traced.drawn;

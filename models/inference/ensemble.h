@@ -19,9 +19,9 @@ class Ensemble {
   /// the pictures that they draw.
   explicit Ensemble(std::vector<CompiledModel> members);
 
-  const Network& first() const { return members_.front().network(); }
+  const SuperTac& first() const { return members_.front().network(); }
   /// The members' pictures are added in their order. predicted_error^2 is the mean of their predicted_error^2
-  /// plus the variance of their pictures, the latents are those of the first. Throws as Network::estimate,
+  /// plus the variance of their pictures, the latents are those of the first. Throws as SuperTac::estimate,
   /// and std::invalid_argument when some predict their error and others do not.
   Estimate estimate(const Tensor& inputs) const;
   Tensor infer(const Tensor& inputs) const { return estimate(inputs).picture; }

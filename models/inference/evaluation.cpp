@@ -33,7 +33,7 @@ void compute(const Ensemble& network, const WindowSet& data, std::span<const std
 
 }  // namespace
 
-void check_format(const WindowSet& windows, const Network& network) {
+void check_format(const WindowSet& windows, const SuperTac& network) {
   const TaxelArray array = windows.array();
   const NetworkFormat own{static_cast<Dim>(windows.frames()), array.rows, array.columns, array.channels,
                           windows.scale()};

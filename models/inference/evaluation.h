@@ -12,7 +12,7 @@
 namespace supertac {
 
 /// Throws std::invalid_argument naming both formats when windows or truths are not those of the network.
-void check_format(const WindowSet& windows, const Network& network);
+void check_format(const WindowSet& windows, const SuperTac& network);
 
 /// A batch of results: inputs as the network takes them, outputs, predicted errors and targets [n,H,W,1], and
 /// the first of their places in `indices`. Predicted errors are empty where the network has none.

@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "autograd/ops/activations.h"
-#include "autograd/ops/max_pool.h"
 #include "autograd/ops/shaping.h"
 
 namespace supertac {

@@ -210,4 +210,11 @@ Prediction SuperTac::draw(const Variable& windows) const {
   return upsampler_.forward(means(windows), windows);
 }
 
+Estimate SuperTac::estimate(const Tensor& windows) const {
+  const NoGrad no_grad;
+  const Prediction drawn = draw(Variable(windows));
+  const auto value = [](const Variable& x) { return x.defined() ? x.value() : Tensor(); };
+  return {drawn.picture.value(), value(drawn.predicted_error), value(drawn.latents)};
+}
+
 }  // namespace supertac

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "autograd/trace.h"
 #include "layers/residual.h"
-#include "models/networks/network.h"
 #include "models/networks/vae.h"
 
 namespace supertac {
@@ -57,6 +57,26 @@ struct SuperTacSettings {
   static SuperTacSettings of_preset(const std::string& name);
 };
 
+/// What a network is for: inputs of `frames` frames of rows x columns taxels with `channels` numbers each,
+/// and pictures `scale` times finer than the array.
+struct NetworkFormat {
+  Dim frames = 1, rows = 4, columns = 4, channels = 1, scale = 4;
+  bool operator==(const NetworkFormat&) const = default;
+};
+
+/// Pictures, with the predicted errors and latents of networks that have them.
+struct Estimate {
+  Tensor picture;          ///< [N,rows scale,columns scale,1]
+  Tensor predicted_error;  ///< the same: how far from the truth a pixel is expected to be; undefined where
+                           ///< nothing says so
+  Tensor latents;          ///< [N,latents]; undefined for a network without any
+};
+
+/// The same on the graph.
+struct Prediction {
+  Variable picture, predicted_error, latents;
+};
+
 /// One T for each group, stored in place: a warm step must not go to the heap.
 template <class T>
 class PerGroup {
@@ -91,7 +111,9 @@ class Upsampler : public Module {
   std::optional<Conv2d> predicted_error_, last_frame_;
 };
 
-class SuperTac : public Network {
+/// Takes what WindowSet::window() gives, numbers in [0,1]. Pictures have no bounds; trained on plates they
+/// lie about in [-1,1], 0 being the plate's plane.
+class SuperTac : public Module {
  public:
   /// Throws as SuperTacSettings::check.
   SuperTac(const SuperTacSettings& settings, Rng& rng);
@@ -106,14 +128,24 @@ class SuperTac : public Network {
   /// Training: windows [N,T,signals] in [0,1] and eps [N,LD] ~ N(0,1) for each group.
   /// Throws std::invalid_argument on other shapes.
   Output forward(const Tensor& windows, std::span<const Tensor> eps) const;
-  /// Evaluation: z = mean, no decoders.
-  Prediction draw(const Variable& windows) const override;
+  /// Evaluation: z = mean, no decoders. Throws std::invalid_argument unless windows have the input_shape() of
+  /// some count.
+  Prediction draw(const Variable& windows) const;
+  /// The same without recording. For many pictures use CompiledModel
+  /// (models/inference/compiled/compiled_model.h), which is faster.
+  Estimate estimate(const Tensor& windows) const;
+  /// The pictures alone, [N,rows scale,columns scale,1].
+  Tensor infer(const Tensor& windows) const { return estimate(windows).picture; }
   /// The latent means [N,G LD]. Throws std::invalid_argument for single frames, which have none.
   Tensor encode(const Tensor& windows) const;
 
   const SuperTacSettings& settings() const { return settings_; }
-  NetworkFormat format() const override;
-  Shape input_shape(Dim count) const override { return {count, settings_.timesteps, settings_.signals()}; }
+  NetworkFormat format() const;
+  /// Of a batch of `count` inputs; likewise picture_shape().
+  Shape input_shape(Dim count) const { return {count, settings_.timesteps, settings_.signals()}; }
+  Shape picture_shape(Dim count) const {
+    return {count, settings_.image_height(), settings_.image_width(), 1};
+  }
 
  private:
   PerGroup<Variable> split(const Variable& windows) const;
@@ -123,6 +155,17 @@ class SuperTac : public Network {
   std::vector<Encoder> encoders_;
   std::vector<Decoder> decoders_;
   Upsampler upsampler_;
+};
+
+/// One inference on these inputs, unrecorded, and the ops that it ran. One of a thread at a time, as Trace.
+struct TracedPrediction {
+  TracedPrediction(const SuperTac& network, const Tensor& inputs)
+      : input(inputs), drawn(network.draw(input)) {}
+
+  NoGrad no_grad;
+  Trace trace;
+  Variable input;
+  Prediction drawn;
 };
 
 }  // namespace supertac

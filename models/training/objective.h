@@ -14,7 +14,7 @@ namespace supertac {
 
 /// One batch, or a micro-batch's share of it.
 struct Batch {
-  Tensor inputs, targets;  ///< as Network::input_shape() and picture_shape() have it
+  Tensor inputs, targets;  ///< as SuperTac::input_shape() and picture_shape() have it
   /// [N,Objective::noise()], ~ N(0,1), LD columns a group; undefined without sampling: z = mean.
   Tensor noise;
 };
@@ -33,7 +33,7 @@ class Objective {
   Objective(const WindowSet& windows, const Recipe& recipe);
   const SuperTac& network() const { return model_; }
   const Recipe& recipe() const { return recipe_; }
-  /// The same with a network of its own, not yet with this one's values: share_values() gives it them.
+  /// The same with a network of its own, not yet with this one's values.
   Objective clone() const { return {recipe_, input_, array_, Rng::zeros()}; }
 
   BatchOutput operator()(const Batch& batch) const;

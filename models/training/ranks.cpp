@@ -17,49 +17,6 @@ class OneProcess : public Ranks {
   }
 };
 
-// Below this a second message costs more than the bytes that it saves.
-constexpr std::size_t kLeastToCut = 4096;
-
-template <class T>
-void add_whole(Ranks& ranks, std::span<T> values, std::span<T> buffer) {
-  for (int apart = 1; apart < ranks.size(); apart *= 2) {
-    ranks.exchange(ranks.rank() ^ apart, std::as_bytes(values), std::as_writable_bytes(buffer));
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] += buffer[i];
-  }
-}
-
-// Each pair of ranks shares out the additions of its piece, neighbours first, so that the sum of every value
-// is the same tree; then the pieces are put together again in the opposite order. A rank sends 2 (1 - 1/R) of
-// its values instead of log2 R.
-template <class T>
-void add_in_pieces(Ranks& ranks, std::span<T> values, std::span<T> buffer) {
-  std::vector<std::span<T>> pieces{values};
-  for (int apart = 1; apart < ranks.size(); apart *= 2) {
-    const std::span<T> all = pieces.back(), low = all.first(all.size() / 2),
-                       high = all.subspan(all.size() / 2);
-    const bool upper = (ranks.rank() & apart) != 0;
-    const std::span<T> mine = upper ? high : low, theirs = upper ? low : high;
-    ranks.exchange(ranks.rank() ^ apart, std::as_bytes(theirs),
-                   std::as_writable_bytes(buffer.first(mine.size())));
-    for (std::size_t i = 0; i < mine.size(); ++i) mine[i] += buffer[i];
-    pieces.push_back(mine);
-  }
-  for (int apart = ranks.size() / 2; apart >= 1; apart /= 2) {
-    const std::span<T> mine = pieces.back();
-    pieces.pop_back();
-    const std::span<T> all = pieces.back();
-    const bool upper = (ranks.rank() & apart) != 0;
-    const std::span<T> theirs = upper ? all.first(all.size() - mine.size()) : all.subspan(mine.size());
-    ranks.exchange(ranks.rank() ^ apart, std::as_bytes(mine), std::as_writable_bytes(theirs));
-  }
-}
-
-template <class T>
-void add_up_over(Ranks& ranks, std::span<T> values, std::span<T> buffer) {
-  return values.size() < kLeastToCut ? add_whole(ranks, values, buffer)
-                                     : add_in_pieces(ranks, values, buffer);
-}
-
 std::string value_of(const nlohmann::ordered_json& all, const std::string& entry) {
   return all.contains(entry) ? all[entry].get<std::string>() : "missing";
 }
@@ -82,8 +39,14 @@ std::vector<std::string> Ranks::gather(const std::string& mine) {
   return all;
 }
 
+template <class T>
+static void add_up_over(Ranks& ranks, std::span<T> values, std::span<T> buffer) {
+  for (int apart = 1; apart < ranks.size(); apart *= 2) {
+    ranks.exchange(ranks.rank() ^ apart, std::as_bytes(values), std::as_writable_bytes(buffer));
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] += buffer[i];
+  }
+}
 void Ranks::add_up(std::span<double> values, std::span<double> buffer) { add_up_over(*this, values, buffer); }
-
 void Ranks::add_up(std::span<float> values, std::span<float> buffer) { add_up_over(*this, values, buffer); }
 
 Ranks& one_process() {

@@ -39,7 +39,11 @@ void read_training(JsonObject entry, Recipe& r) {
 }  // namespace
 
 void Recipe::check() const {
-  TrainingPace::check();
+  require(epochs >= 1 && epochs <= 100'000, "epochs from 1 to 100000", static_cast<double>(epochs));
+  require(batch >= 1 && batch <= 4096, "batch from 1 to 4096", static_cast<double>(batch));
+  require(learning_rate > 0 && learning_rate <= 1, "learning_rate above 0 and at most 1", learning_rate);
+  require(warm_up >= 0 && warm_up < 1, "warm_up as a share of all steps, 0 to below 1", warm_up);
+  require(clip_norm >= 0 && std::isfinite(clip_norm), "clip_norm of 0 (never) or more", clip_norm);
   model.check();
   loss.check();
   require(rate_hz >= 20 && rate_hz <= 2000, "rate_hz from 20 to 2000", rate_hz);

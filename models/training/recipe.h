@@ -2,6 +2,7 @@
 // recipe and the same recordings make the same bytes, whoever trains (docs/determinism.md).
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -12,14 +13,20 @@
 #include "models/inference/interval.h"
 #include "models/networks/supertac_model.h"
 #include "models/training/loss/loss.h"
-#include "models/training/training_state.h"
 
 namespace supertac {
 
 struct ModelFile;
 
-struct Recipe : TrainingPace {
-  SuperTacSettings model;  ///< rows, columns and in_channels become those of the recordings
+struct Recipe {
+  std::int64_t epochs = 20;  ///< 1 to 100,000
+  std::int64_t batch = 64;   ///< 1 to 4096
+  std::uint64_t seed = 0;
+  double learning_rate = 1e-3;  ///< Adam's peak, above 0 and at most 1
+  double warm_up = 0.05;        ///< share of all steps in which the rate rises; then half a cosine to 0
+  double clip_norm = 1;         ///< 0 = never
+  bool muon = false;            ///< as AdamOptions::muon
+  SuperTacSettings model;       ///< rows, columns and in_channels become those of the recordings
   LossWeights loss;
   /// Whether z is drawn around its mean. Without, and with beta 0, the VAEs are plain autoencoders: older
   /// files have it (preset "best").

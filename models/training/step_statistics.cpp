@@ -6,6 +6,8 @@
 
 namespace supertac {
 
+constexpr int kFlatStepsToReport = 100;
+
 void Trainer::Variances::clear() {
   for (BatchVariance* variance : all()) variance->clear();
 }
@@ -15,7 +17,7 @@ void Trainer::Variances::add(const Variances& other) {
 }
 
 // Loss terms and variances of micro-batches, then of processes, as balanced binary trees; gradients are added
-// in TrainingState::apply().
+// in Trainer::apply().
 void Trainer::add_up_statistics(StepReport& report) {
   for (std::size_t apart = 1; apart < micro_batches_.size(); apart *= 2) {
     for (std::size_t micro_batch = 0; micro_batch + apart < micro_batches_.size(); micro_batch += 2 * apart) {
@@ -51,7 +53,7 @@ void Trainer::check_finite(const LossTerms& t) const {
     where = its;
     if (!where.empty()) break;
   }
-  state_.stop(t.text() + (where.empty() ? "" : ": " + where));
+  stop(t.text() + (where.empty() ? "" : ": " + where));
 }
 
 void Trainer::look_for_collapse(StepReport& report) {
@@ -60,7 +62,9 @@ void Trainer::look_for_collapse(StepReport& report) {
   const auto samples = static_cast<double>(indices_.size());
   report.active_latents = active_latents(variances.means, samples);
   const bool idle = objective_.latents() > 0 && report.active_latents == 0;
-  report.collapsed = state_.collapsed(idle || is_degenerate(variances.pictures, variances.targets, samples));
+  const bool flat = idle || is_degenerate(variances.pictures, variances.targets, samples);
+  flat_steps_ = flat && step_ >= schedule_.warm_up ? flat_steps_ + 1 : 0;
+  report.collapsed = flat_steps_ >= kFlatStepsToReport;
 }
 
 }  // namespace supertac

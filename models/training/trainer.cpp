@@ -5,6 +5,7 @@
 
 #include "autograd/ops/arithmetic.h"
 #include "io/numbers/hash.h"
+#include "io/numbers/numbers.h"
 #include "models/inference/evaluation.h"
 #include "models/training/loss/diagnosis.h"
 
@@ -23,7 +24,14 @@ Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Obj
       objective_(std::move(objective)),
       batching_(std::move(train), static_cast<std::size_t>(objective_.recipe().batch),
                 objective_.recipe().seed),
-      state_(model().parameters(), objective_.recipe(), objective_.recipe().epochs * steps_per_epoch()),
+      adam_(values_of(model().parameters()), {.learning_rate = objective_.recipe().learning_rate,
+                                              .clip_norm = objective_.recipe().clip_norm,
+                                              .muon = objective_.recipe().muon}),
+      schedule_{.peak = objective_.recipe().learning_rate,
+                .warm_up = static_cast<std::int64_t>(
+                    objective_.recipe().warm_up *
+                    static_cast<double>(objective_.recipe().epochs * steps_per_epoch())),
+                .total = objective_.recipe().epochs * steps_per_epoch()},
       ranks_(ranks) {
   check_format(windows, model());
   indices_.resize(batching_.batch_size());
@@ -46,7 +54,9 @@ Trainer::MicroBatch::MicroBatch(const Objective& master, Dim first_sample, Dim c
   variances.pictures = variances.targets =
       BatchVariance(static_cast<std::size_t>(batch.targets.size() / count));
   variances.means = BatchVariance(static_cast<std::size_t>(master.latents()));
-  share_values(master.network().parameters(), objective.network().parameters());
+  const auto &of_master = master.network().parameters(), &own = objective.network().parameters();
+  for (std::size_t i = 0; i < own.size(); ++i)
+    Variable(own[i].value).mutable_value() = of_master[i].value.value();  // the same buffer
 }
 
 // The windows [n,T,signals] and truths [n,H,W,1] of this step, n the samples of a micro-batch, each augmented
@@ -88,7 +98,7 @@ void Trainer::run(MicroBatch& micro_batch) const {
   const std::vector<Parameter>& parameters = micro_batch.objective.network().parameters();
   fill(micro_batch);
   draw_noise(micro_batch);
-  drop_gradients(parameters);
+  for (const Parameter& p : parameters) Variable(p.value).drop_grad();  // backward() sets the next ones
   const BatchOutput output = micro_batch.objective(micro_batch.batch);
   const double share =
       static_cast<double>(micro_batch.batch.inputs.dim(0)) / static_cast<double>(indices_.size());
@@ -130,7 +140,7 @@ StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMi
   }
   StepReport report;
   report.step = step() + 1;
-  report.learning_rate = state_.learning_rate();
+  report.learning_rate = schedule_.at(step_);
   for (MicroBatch& micro_batch : micro_batches_) {
     if (micro_batch.error) std::rethrow_exception(std::exchange(micro_batch.error, nullptr));
   }
@@ -138,7 +148,7 @@ StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMi
   add_up_statistics(report);
   check_finite(report);
   look_for_collapse(report);
-  report.gradient_norm = state_.apply(micro_batch_parameters_, ranks_);
+  report.gradient_norm = apply();
   if (step() % kStepsPerComparison == 0) check_same();
   return report;
 }
@@ -151,9 +161,10 @@ std::map<std::string, std::string> Trainer::metadata(std::map<std::string, std::
   return origin;
 }
 
-void Trainer::save(const std::string& path, std::map<std::string, std::string> metadata) const {
-  check_same();
-  if (ranks_.first()) state_.save(path, this->metadata(std::move(metadata)));
+void Trainer::stop(const std::string& what) const {
+  throw TrainingStopped("training stopped at step " + std::to_string(step_ + 1) + ": " + what +
+                        "; lower --learning-rate (now " + format(schedule_.peak) +
+                        ") or check the input with supertac-info");
 }
 
 void Trainer::check_same() const {
@@ -168,10 +179,6 @@ void Trainer::check_same() const {
                    found->of_first +
                    "): its memory or its build is faulty; leave that machine out and continue from the last "
                    "state with --resume");
-}
-
-void Trainer::restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata) {
-  state_.restore(path, metadata(expected_metadata));
 }
 
 }  // namespace supertac

@@ -17,16 +17,17 @@
 #include <exception>
 #include <functional>
 #include <map>
-#include <memory>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "autograd/optimisers/adam.h"
 #include "data/windows/batching.h"
 #include "models/training/loss/collapse.h"
+#include "models/training/loss/schedule.h"
 #include "models/training/objective.h"
 #include "models/training/ranks.h"
-#include "models/training/training_state.h"
 
 namespace supertac {
 
@@ -39,6 +40,12 @@ struct StepReport : LossTerms {
   /// (models/training/loss/collapse.h). Lower the learning rate or, when no latent is active, beta.
   bool collapsed = false;
   bool stop = false;  ///< whether a process asked to stop after this step
+};
+
+/// A value was not finite: step, where, and what to do are in what().
+class TrainingStopped : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
 };
 
 /// Stands around each micro-batch of a step, on its thread: must call `run`, which fills the batch and goes
@@ -58,14 +65,18 @@ class Trainer {
   Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Objective objective,
           Ranks& ranks = one_process());
 
-  bool done() const { return state_.done(); }
-  std::int64_t step() const { return state_.step(); }
-  std::int64_t total_steps() const { return state_.total_steps(); }
+  bool done() const { return step_ >= schedule_.total || epochs_since_best_ >= kPatience; }
+  std::int64_t step() const { return step_; }  ///< done so far
+  std::int64_t total_steps() const { return schedule_.total; }
   std::int64_t steps_per_epoch() const { return static_cast<std::int64_t>(batching_.batches_per_epoch()); }
-  /// As TrainingState.
-  void epoch_scored(double score) { state_.epoch_scored(score, step() / steps_per_epoch()); }
-  void use_best() { state_.use_best(); }
-  const TrainingState& state() const { return state_; }
+  /// A network is over-trained when what it was not trained on gets worse: of the scored epochs the best
+  /// network is kept, and after kPatience others the training is done.
+  static constexpr std::int64_t kPatience = 5;
+  void epoch_scored(double score);
+  /// Sets the parameters to those of the best epoch, where any was scored.
+  void use_best();
+  std::int64_t best_epoch() const { return best_epoch_; }  ///< from 1; 0: none was scored
+  double best_score() const { return best_score_; }
   const Objective& objective() const { return objective_; }
   const SuperTac& model() const { return objective_.network(); }
   const WindowSet& windows() const { return windows_; }
@@ -86,10 +97,9 @@ class Trainer {
   std::span<const std::uint32_t> batch() const { return indices_; }
   /// Those of any step, from 0.
   void batch_of(std::int64_t step, std::span<std::uint32_t> out) const;
-  /// Every array of the state.
-  void for_each_tensor(const std::function<void(const std::string&, const Tensor&)>& visit) const {
-    state_.for_each_tensor(visit);
-  }
+  /// Every array of the state: the parameters, then Adam's first and second moments, named as in a
+  /// checkpoint.
+  void for_each_tensor(const std::function<void(const std::string&, const Tensor&)>& visit) const;
 
   /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Of several
   /// processes only the first writes, after check_same(). Throws FileError.
@@ -120,6 +130,11 @@ class Trainer {
   void run(MicroBatch& micro_batch) const;
   void fill(MicroBatch& micro_batch) const;
   void draw_noise(MicroBatch& micro_batch) const;
+  /// Throws TrainingStopped: step, `what`, and advice.
+  [[noreturn]] void stop(const std::string& what) const;
+  // In training_state.cpp:
+  double apply();
+  void add_up_over_ranks();
   // In step_statistics.cpp:
   void add_up_statistics(StepReport& report);
   void look_for_collapse(StepReport& report);
@@ -128,8 +143,15 @@ class Trainer {
   const WindowSet& windows_;
   Objective objective_;
   Batching batching_;
-  TrainingState state_;
+  mutable Adam adam_;
+  Schedule schedule_;
   Ranks& ranks_;
+  std::int64_t step_ = 0;
+  int flat_steps_ = 0;        // in a row that look collapsed, from the end of the warm-up on
+  std::vector<Tensor> best_;  // the parameters of the best epoch
+  double best_score_ = 0;
+  std::int64_t best_epoch_ = 0, epochs_since_best_ = 0;
+  std::vector<real> sum_, of_partner_sum_;  // all gradients in one piece, of several processes
   std::vector<double> statistics_, of_partner_;
   std::vector<std::uint32_t> indices_;                                 // of the batch
   std::vector<MicroBatch> micro_batches_;                              // of this process

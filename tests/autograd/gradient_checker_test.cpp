@@ -72,19 +72,6 @@ TEST(GradientChecker, FailsOnOneWrongElement) {
             "input 0 [1,0,1,0] of [2,2,3,1]");
 }
 
-TEST(GradientChecker, ReportsOneLinePerEntry) {
-  const GradientReport report{
-      {{0, 0, 0.25, 0.5, 0.5, "fc.weight [3,0] of [5,4]"}, {1, 0, 1, -1, 2, "fc.bias [0] of [4]"}},
-      2,
-      24,
-      {},
-      2};
-  EXPECT_EQ(report.text(),
-            "2 of 24 entries off by more than 1e-06\n"
-            "fc.weight [3,0] of [5,4]: analytic 0.25, numeric 0.5, relative error 0.5\n"
-            "fc.bias [0] of [4]: analytic 1, numeric -1, relative error 2\n");
-}
-
 TEST(GradientChecker, FailsOnNotANumber) {
   const auto f = [](const std::vector<Variable>& in) {
     return record("planted", in[0].value().clone(), {&in[0]},

@@ -1,15 +1,14 @@
-// What a report of wrong gradients says of a layer, and the inputs of every op one by one; `supertac-check
-// gradients` compares all of apps/check/gradient_cases.cpp with finite differences.
+// The inputs of every op one by one, and errors planted in each; `supertac-check gradients` compares all of
+// apps/check/gradient_cases.cpp with finite differences.
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "apps/check/gradient_cases.h"
 #include "autograd/gradient_checker.h"
 #include "autograd/ops/arithmetic.h"
-#include "autograd/record.h"
-#include "layers/residual.h"
-#include "tests/layers/noise.h"
+#include "autograd/trace.h"
 
 namespace supertac {
 namespace {
@@ -28,25 +27,41 @@ TEST(OpGradients, AnInputHasTheSameOneWhereAllOthersAreConstants) {
   }
 }
 
-// The parameter's name as in a checkpoint, its indices as in memory: [kernel..., in, out].
-TEST(LayerGradients, AReportNamesTheParameterAndItsElement) {
-  Rng rng(9);
-  const Rcab layer(8, 4, rng);
-  const Variable x(noise({1, 3, 4, 8}, 11), true);
-  const Variable weight = layer.parameters()[2].value;
-  const auto f = [&] {  // a node that spoils one entry of the gradient on its way back
-    const Variable spoiled = record("spoil", weight.value(), {&weight}, [](Backward& b) {
-      Tensor* g = b.grad_of(0);
-      for (Dim i = 0; i < g->size(); ++i) g->data()[i] += (i == 329 ? 2 : 1) * b.gy().data()[i];
-    });
-    return conv2d(x, spoiled, layer.parameters()[3].value, {.padding = 1});
-  };
-  const GradientReport report =
-      check_gradients(f, values_of(layer.parameters()),
-                      {.max_entries_per_input = 576, .names = names_of(layer.parameters())});
-  EXPECT_EQ(report.wrong, 1);
-  EXPECT_NE(report.text().find("\nconv.1.weight [1,2,1,1] of [3,3,8,8]: analytic "), std::string::npos)
-      << report.text();
+// Spoils what the reverse step of an op adds to the gradient of one input.
+struct Planted : ReverseWatch {
+  enum Kind { sign, twice, index };
+  std::string op;
+  std::size_t input = 0;
+  Kind kind = sign;
+
+  void reverse(Backward& b, const std::function<void()>& step) override {
+    Tensor* const gradient = b.node().op == op && input < b.node().input_count ? b.grad_of(input) : nullptr;
+    if (gradient == nullptr) return step();
+    const Tensor before = gradient->clone();
+    step();
+    std::vector<real> added(gradient->values().begin(), gradient->values().end());
+    for (std::size_t i = 0; i < added.size(); ++i) added[i] -= before.values()[i];
+    if (kind == index && !added.empty()) std::rotate(added.begin(), added.end() - 1, added.end());
+    for (std::size_t i = 0; i < added.size(); ++i)
+      gradient->values()[i] = before.values()[i] + added[i] * (kind == sign ? -1 : kind == twice ? 2 : 1);
+  }
+};
+
+TEST(OpGradients, APlantedErrorIsFoundAndNamed) {
+  std::string last;
+  for (const GradientCase& c : op_cases()) {
+    if (std::exchange(last, c.name) == c.name) continue;
+    for (std::size_t input = 0; input < c.leaves.size(); ++input) {
+      for (const Planted::Kind kind : {Planted::sign, Planted::twice, Planted::index}) {
+        if (kind == Planted::index && c.name == "sum") continue;  // the same number at every index
+        Planted plant;
+        plant.op = c.name, plant.input = input, plant.kind = kind;
+        const GradientReport report = check_gradients(c.f, c.leaves, c.options);
+        EXPECT_GT(report.wrong, 0) << c.options.names[input] << ", " << kind;
+        EXPECT_TRUE(report.worst.front().place.starts_with(c.options.names[input])) << report.text();
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -69,17 +69,5 @@ TEST(Rirb, AddsItsInputToWhatItsBlocksMake) {
   for (Dim i = 2; i < 8; ++i) EXPECT_EQ(y.data()[i], 0) << i;
 }
 
-TEST(Rirb, RefusesFewerThanNoBlocks) {
-  Rng rng(1);
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Rirb({.channels = 4, .reduction = 2, .blocks = -1}, rng); }),
-            "Rirb: blocks must be 0 or more, got -1");
-}
-
-TEST(Rirb, DoublesTheMap) {
-  Rng rng(4);
-  const Rirb rirb({.channels = 8, .reduction = 4, .blocks = 1}, rng);
-  EXPECT_EQ(rirb.forward(Variable(noise({2, 3, 5, 8}, 2))).shape(), (Shape{2, 6, 10, 8}));
-}
-
 }  // namespace
 }  // namespace supertac

@@ -120,7 +120,6 @@ class Pool {
     if (closed_) return source().take(size_class);
     std::vector<void*>& list = free_.at(size_class.index);
     if (list.empty()) {
-      ++heap_allocations_;
       // Now, since a release cannot say that there is no memory for its list.
       const std::size_t made = ++made_[size_class.index];
       if (list.capacity() < made) list.reserve(2 * made);
@@ -135,12 +134,9 @@ class Pool {
             : keep(block, free_[index]);
   }
 
-  std::uint64_t heap_allocations() const { return heap_allocations_; }
-
  private:
   FreeBlocks free_;
   std::array<std::size_t, std::tuple_size_v<FreeBlocks>> made_{};  // blocks that this thread asked for
-  std::uint64_t heap_allocations_ = 0;
   bool closed_ = false;
 };
 
@@ -150,6 +146,5 @@ thread_local Pool pool;
 
 void* pool_allocate(std::size_t bytes) { return pool.allocate(bytes); }
 void pool_release(void* block, std::size_t bytes) noexcept { pool.release(block, bytes); }
-std::uint64_t pool_heap_allocations() { return pool.heap_allocations(); }
 
 }  // namespace supertac

@@ -7,7 +7,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 
 namespace supertac {
 
@@ -17,10 +16,6 @@ void* pool_allocate(std::size_t bytes);
 
 /// Gives a block back; `bytes` is the number that was asked for.
 void pool_release(void* block, std::size_t bytes) noexcept;
-
-/// How many blocks this thread's pool has taken from what all threads share so far: the heap, or a thread
-/// that has ended (a warm step adds none).
-std::uint64_t pool_heap_allocations();
 
 /// Scratch memory of one function: an array of trivial values from the pool, contents undefined.
 template <class T>

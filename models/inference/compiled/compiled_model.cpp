@@ -8,27 +8,19 @@
 
 namespace supertac {
 
-CompiledModel::CompiledModel(const Network& network) : network_(&network) {
+CompiledModel::CompiledModel(const SuperTac& network) : network_(&network) {
   if (!kernels::is_plain()) plan_ = Compiler::plan(network);
 }
 
-CompiledModel::CompiledModel(const Network& network, const ActivationRanges& ranges)
+CompiledModel::CompiledModel(const SuperTac& network, const ActivationRanges& ranges)
     : network_(&network), integers_(IntegerPlan::of(network, ranges)) {}
 
-Estimate CompiledModel::estimate(const Tensor& inputs) const { return run(inputs, nullptr); }
-
-Estimate CompiledModel::watched(const Tensor& input, const StepWatch& watch) const {
-  if (input.rank() < 1 || input.dim(0) != 1)
-    throw std::invalid_argument("CompiledModel: one window is watched, got " + input.shape().text());
-  return run(input, &watch);
-}
-
-Estimate CompiledModel::run(const Tensor& inputs, const StepWatch* watch) const {
+Estimate CompiledModel::estimate(const Tensor& inputs) const {
   if (plan_ == nullptr && integers_ == nullptr) return network_->estimate(inputs);
   if (inputs.rank() < 1 || inputs.shape() != network_->input_shape(inputs.dim(0)))
     throw std::invalid_argument("CompiledModel: inputs expects " + network_->input_shape(0).text() +
                                 " with any first size, got " + inputs.shape().text());
-  return integers_ ? integers_->run(inputs, watch) : plan_->run(inputs, watch);
+  return integers_ ? integers_->run(inputs) : plan_->run(inputs);
 }
 
 }  // namespace supertac

@@ -23,7 +23,7 @@ bool Compiler::filters_anew(std::size_t second_cache) const {
   return weights_ + maps <= second_cache && weights_ + transformed_ + maps > second_cache;
 }
 
-std::shared_ptr<const Plan> Compiler::plan(const Network& network, std::size_t second_cache) {
+std::shared_ptr<const Plan> Compiler::plan(const SuperTac& network, std::size_t second_cache) {
   const TracedPrediction traced(network, Tensor::zeros(network.input_shape(1)));
   const Prediction& drawn = traced.drawn;
   Compiler compiler(traced);
@@ -45,8 +45,6 @@ Compiler::Compiler(const TracedPrediction& traced) : TraceWalk(traced) {
                              "; models/inference/compiled/plan_steps.cpp lists those that have one");
     takes_input(ops[i]);  // or throws
     make->second(*this, ops[i]);
-    if (maps_.contains(ops[i].y.node()))
-      plan_->made_.push_back({plan_->steps_.size(), std::string(ops[i].op), map_of(ops[i].y)});
     release_after(i);
   }
 }

@@ -18,7 +18,7 @@ class Compiler : TraceWalk {
  public:
   /// Throws std::logic_error naming an op that has no step. `second_cache`: of the processor, in bytes; 0:
   /// not known.
-  static std::shared_ptr<const Plan> plan(const Network& network,
+  static std::shared_ptr<const Plan> plan(const SuperTac& network,
                                           std::size_t second_cache = second_cache_bytes());
 
   // For the steps.

@@ -24,7 +24,7 @@ constexpr Dim kFour = 4;  // bytes, and outputs, that kernels.c multiplies toget
 
 class IntegerCompiler : TraceWalk {
  public:
-  IntegerCompiler(const Network& network, const ActivationRanges& ranges, const TracedPrediction& traced);
+  IntegerCompiler(const SuperTac& network, const ActivationRanges& ranges, const TracedPrediction& traced);
   std::shared_ptr<IntegerPlan> plan() { return std::move(plan_); }
 
  private:
@@ -54,7 +54,7 @@ class IntegerCompiler : TraceWalk {
   std::map<int, Id> value_of_;
 };
 
-IntegerCompiler::IntegerCompiler(const Network& network, const ActivationRanges& ranges,
+IntegerCompiler::IntegerCompiler(const SuperTac& network, const ActivationRanges& ranges,
                                  const TracedPrediction& traced)
     : TraceWalk(traced) {
   const std::vector<TracedOp>& ops = traced.trace.ops();
@@ -225,7 +225,7 @@ void IntegerCompiler::add_product(const TracedOp& op, int x, int y, ProductTaps 
 
 }  // namespace
 
-std::shared_ptr<const IntegerPlan> IntegerPlan::of(const Network& network, const ActivationRanges& ranges) {
+std::shared_ptr<const IntegerPlan> IntegerPlan::of(const SuperTac& network, const ActivationRanges& ranges) {
   const TracedPrediction traced(network, Tensor::zeros(network.input_shape(1)));
   const std::shared_ptr<IntegerPlan> plan = IntegerCompiler(network, ranges, traced).plan();
   plan->compile();

@@ -108,22 +108,6 @@ void run_step(const IntegerStep& s, const c99::product& product, const real* inp
   }
 }
 
-// What the map of a step stands for.
-void show(const StepWatch& watch, const IntegerStep& step, const IntegerMap& of, const c99::map* y) {
-  Tensor map(Shape{of.height, of.width, of.channels});
-  if (of.bytes) {
-    const std::uint8_t* from = c99::bytes_of(y) + of.origin();
-    for (Dim line = 0, to = 0; line < of.height; ++line)
-      for (Dim i = 0; i < of.width * of.channels; ++i, ++to)
-        map.data()[to] = static_cast<real>(of.scale.step * (from[line * of.line() + i] - of.scale.zero));
-  } else {
-    c99::give(y, map.data());
-  }
-  if (step.kind == IntegerStep::Kind::gates)  // in 4096ths
-    for (real& gate : map.values()) gate *= 1 / (4096 * c99::number_step);
-  watch(step.name, map);
-}
-
 }  // namespace
 
 void IntegerPlan::compile() {
@@ -137,7 +121,7 @@ void IntegerPlan::compile() {
 
 float IntegerPlan::number_step() const { return std::ldexp(1.0F, -fraction_bits); }
 
-Estimate IntegerPlan::run(const Tensor& inputs, const StepWatch* watch) const {
+Estimate IntegerPlan::run(const Tensor& inputs) const {
   const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
   Estimate out;
   out.picture = Tensor(Shape{count, map(picture).height, map(picture).width, 1});
@@ -155,8 +139,6 @@ Estimate IntegerPlan::run(const Tensor& inputs, const StepWatch* watch) const {
       const IntegerStep& s = steps[i];
       run_step(s, all.products[i], inputs.data() + n * size, all.map(s.x), all.map(s.a), all.map(s.gates),
                all.map(s.y));
-      const bool complete = i + 1 == steps.size() || steps[i + 1].y != s.y;  // by several steps at times
-      if (watch != nullptr && complete) show(*watch, s, map(s.y), all.map(s.y));
     }
     give(picture, out.picture);
     give(predicted_error, out.predicted_error);

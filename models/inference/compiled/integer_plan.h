@@ -11,7 +11,7 @@
 #include "models/inference/compiled/quantise.h"
 #include "models/inference/compiled/ranges.h"
 #include "models/inference/compiled/taps.h"
-#include "models/networks/network.h"
+#include "models/networks/supertac_model.h"
 
 namespace supertac {
 
@@ -58,9 +58,9 @@ struct IntegerStep {
 struct IntegerPlan {
   /// Throws std::logic_error naming an op that has no step, std::invalid_argument for the ranges of another
   /// network, std::runtime_error for a layer that kernels.c cannot count in 16 bits.
-  static std::shared_ptr<const IntegerPlan> of(const Network& network, const ActivationRanges& ranges);
-  /// Throws nothing; inputs as Network::estimate.
-  Estimate run(const Tensor& inputs, const StepWatch* watch = nullptr) const;
+  static std::shared_ptr<const IntegerPlan> of(const SuperTac& network, const ActivationRanges& ranges);
+  /// Throws nothing; inputs as SuperTac::estimate.
+  Estimate run(const Tensor& inputs) const;
   float number_step() const;
   const IntegerMap& map(int i) const { return maps[static_cast<std::size_t>(i)]; }
 

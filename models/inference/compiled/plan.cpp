@@ -18,16 +18,7 @@ void Plan::copy_out(const Block& block, const FeatureMap& map, Tensor& to, Dim f
   }
 }
 
-void Plan::show(const StepWatch& watch, const Block& block, std::size_t steps_done) const {
-  for (const Made& made : made_) {
-    if (made.steps != steps_done) continue;
-    Tensor map(Shape{made.map.height, made.map.width, made.map.channels});
-    copy_out(block, made.map, map, 0);
-    watch(made.op, map);
-  }
-}
-
-Estimate Plan::run(const Tensor& inputs, const StepWatch* watch) const {
+Estimate Plan::run(const Tensor& inputs) const {
   const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
   Estimate out{.picture = Tensor(Shape{count, picture_.height, picture_.width, 1}),
                .predicted_error = {},
@@ -41,10 +32,7 @@ Estimate Plan::run(const Tensor& inputs, const StepWatch* watch) const {
     const Block block{inputs.data() + first * size, std::min(block_, count - first), workspace, memory.data(),
                       filters_anew_};
     if (first == 0 || block.images != block_) clear_margins(block);
-    for (std::size_t i = 0; i < steps_.size(); ++i) {
-      steps_[i](block);
-      if (watch != nullptr) show(*watch, block, i + 1);
-    }
+    for (const PlanStep& step : steps_) step(block);
     copy_out(block, picture_, out.picture, first);
     if (predicted_error_) copy_out(block, *predicted_error_, out.predicted_error, first);
     if (latents_) copy_out(block, *latents_, out.latents, first);

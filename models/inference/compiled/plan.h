@@ -3,13 +3,12 @@
 
 #include <functional>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "autograd/kernels/fast/inference.h"
 #include "models/inference/compiled/compiled_model.h"
 #include "models/inference/compiled/taps.h"
-#include "models/networks/network.h"
+#include "models/networks/supertac_model.h"
 
 namespace supertac {
 
@@ -29,8 +28,7 @@ using PlanStep = std::function<void(const Block&)>;
 
 class Plan {
  public:
-  /// `watch` is for one window.
-  Estimate run(const Tensor& inputs, const StepWatch* watch = nullptr) const;
+  Estimate run(const Tensor& inputs) const;
   /// Whether few pictures have Winograd's filters transformed on the way: the same bits from less memory.
   bool filters_anew() const { return filters_anew_; }
 
@@ -38,7 +36,6 @@ class Plan {
   friend class Compiler;
   FeatureMap add_buffer(FeatureMap layout);
   void clear_margins(const Block& block) const;
-  void show(const StepWatch& watch, const Block& block, std::size_t steps_done) const;
   void copy_out(const Block& block, const FeatureMap& map, Tensor& to, Dim first) const;
 
   /// Images that go through the steps together. They share the weights on their way from memory, but what
@@ -46,13 +43,7 @@ class Plan {
   static constexpr Dim kBlock = 8, kLargeBlock = 16;
   static constexpr std::size_t kLargeCache = std::size_t{2} << 20;
 
-  struct Made {
-    std::size_t steps = 0;  // after so many
-    std::string op;
-    FeatureMap map;
-  };
   std::vector<PlanStep> steps_;
-  std::vector<Made> made_;           // in the order of the ops
   std::vector<FeatureMap> buffers_;  // each once
   std::vector<FeatureMap> planes_;   // those with margins inside: of one image, channel by channel
   Dim workspace_ = 0;                // numbers of an image

@@ -10,7 +10,7 @@ namespace supertac {
 
 static const std::string kName = "int8.ranges";
 
-void ActivationRanges::add(const Network& network, const Tensor& inputs) {
+void ActivationRanges::add(const SuperTac& network, const Tensor& inputs) {
   const TracedPrediction traced(network, inputs);
   const std::vector<TracedOp>& ops = traced.trace.ops();
   if (low_.empty()) low_.resize(ops.size(), 0), high_ = low_;

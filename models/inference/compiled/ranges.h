@@ -8,16 +8,16 @@
 
 #include "layers/checkpoint.h"
 #include "models/inference/compiled/quantise.h"
-#include "models/networks/network.h"
+#include "models/networks/supertac_model.h"
 
 namespace supertac {
 
 /// Smallest and largest value of each op of an inference, in their order, over the inputs that were added.
 class ActivationRanges {
  public:
-  /// Runs the network on these inputs and widens the ranges, which begin with 0. Throws as Network::draw, and
-  /// std::invalid_argument for a network of another number of ops.
-  void add(const Network& network, const Tensor& inputs);
+  /// Runs the network on these inputs and widens the ranges, which begin with 0. Throws as SuperTac::draw,
+  /// and std::invalid_argument for a network of another number of ops.
+  void add(const SuperTac& network, const Tensor& inputs);
   /// As stored() wrote it; empty for a file without. Throws std::runtime_error naming path and tensor.
   static std::optional<ActivationRanges> read(const SafetensorsFile& file, const std::string& path);
   StoredTensor stored() const;

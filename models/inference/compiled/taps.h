@@ -7,7 +7,7 @@
 
 #include "autograd/kernels/fast/inference.h"
 #include "autograd/trace.h"
-#include "models/networks/network.h"
+#include "models/networks/supertac_model.h"
 
 namespace supertac {
 

@@ -6,7 +6,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "autograd/reverse_watch.h"
+#include "autograd/trace.h"
 #include "io/numbers/sha256.h"
 
 namespace supertac {
@@ -25,12 +25,26 @@ std::string reference_to(const Tensor& tensor) {
   return hash_of(tensor.values()) + " " + tensor.shape().text();
 }
 
+// What docs/audit.md calls the settings of an operator.
+Json settings_of(const TracedOp& op) {
+  const OpSettings& s = op.settings;
+  const auto dims = op.y.shape().dims();
+  Json settings = {{"shape", std::vector<Dim>(dims.begin(), dims.end())}};
+  if (op.op.starts_with("conv"))
+    settings.update({{"stride", s.conv.stride_w}, {"padding", s.conv.padding_w}});
+  if (op.op.starts_with("conv") || op.op == "linear" || op.op.ends_with("relu"))
+    settings["slope"] = s.negative_slope;
+  if (op.op == "take_runs") settings.update({{"first", s.first}, {"run", s.run}, {"step", s.step}});
+  if (op.op == "scale") settings["factor"] = s.factor;
+  if (op.op == "clamp") settings.update({{"low", s.low}, {"high", s.high}});
+  return settings;
+}
+
 // What all micro-batches of one opening share.
 class Opening {
  public:
-  Opening(const OpeningOptions& options, OpenedStep& opened) : options_(options), opened_(opened) {}
-  const OpeningOptions& options() const { return options_; }
-  bool keeps(const std::string& name) const { return options_.keep && name.starts_with(*options_.keep); }
+  Opening(const std::optional<std::string>& keep, OpenedStep& opened) : keep_(keep), opened_(opened) {}
+  bool keeps(const std::string& name) const { return keep_ && name.starts_with(*keep_); }
   void keep(const std::string& reference, const Tensor& values) {
     const std::lock_guard lock(mutex_);
     if (Tensor& kept = opened_.arrays[reference]; !kept.defined()) kept = values.clone();
@@ -39,7 +53,7 @@ class Opening {
   std::unordered_map<const real*, std::string> parameters;  // by the buffer that all micro-batches share
 
  private:
-  const OpeningOptions& options_;
+  const std::optional<std::string>& keep_;
   OpenedStep& opened_;
   std::mutex mutex_;
 };
@@ -102,26 +116,21 @@ class MicroBatchWatch : Trace, ReverseWatch {
     const std::string name = name_of(index);
     return {{"name", name},
             {"op", op.op},
-            {"settings", operator_settings(op)},
+            {"settings", settings_of(op)},
             {"inputs", inputs_of(name, op)},
             {"outputs", {value_of(name, op.y)}}};
   }
 
-  void noted(TracedOp& op) override {
-    index_[op.y.node()] = ops().size() - 1;
-    if (opening_.options().touch)
-      opening_.options().touch(name_of(ops().size() - 1), 0, op, op.y.mutable_value());
-  }
-
-  void reverse(const char*, std::size_t inputs, Backward& b, const std::function<void()>& step) override {
-    const std::size_t index = index_.at(&b.node());
+  void reverse(Backward& b, const std::function<void()>& step) override {
+    for (std::size_t i = index_.size(); i < ops().size(); ++i) index_[ops()[i].y.node()] = i;
+    const std::size_t index = index_.at(&b.node()), inputs = b.node().input_count;
     const TracedOp& op = ops()[index];
     const std::string name = name_of(index) + "/reverse";
     std::string& gy = gradients_[&b.node()];
     if (gy.empty()) gy = reference_to(b.gy());
     Json ran = {{"name", name},
                 {"op", op.op},
-                {"settings", operator_settings(op)},
+                {"settings", settings_of(op)},
                 {"inputs", inputs_of(name, op)},
                 {"y", value_of(name, op.y)},
                 {"gy", kept(name, gy, b.gy())},
@@ -136,7 +145,6 @@ class MicroBatchWatch : Trace, ReverseWatch {
     for (std::size_t i = 0; i < inputs; ++i) {
       detail::Node* x = b.node().inputs[i];
       const bool made = x->requires_grad && x->grad.defined();
-      if (made && opening_.options().touch) opening_.options().touch(name, i, op, x->grad);
       ran["outputs"].push_back(made ? kept(name, gradients_[x] = reference_to(x->grad), x->grad) : "");
     }
     reverse_.push_back(std::move(ran));
@@ -201,7 +209,7 @@ class Update {
   Json applied(const StepReport& report) {
     const State after(trainer_);
     const std::vector<Parameter>& parameters = trainer_.model().parameters();
-    const TrainingPace& pace = trainer_.objective().recipe();
+    const Recipe& pace = trainer_.objective().recipe();
     const AdamOptions adam;
     const double norm = report.gradient_norm;
     Json all = Json::array();
@@ -248,26 +256,12 @@ class Update {
 
 }  // namespace
 
-Json operator_settings(const TracedOp& op) {
-  const OpSettings& s = op.settings;
-  const auto dims = op.y.shape().dims();
-  Json settings = {{"shape", std::vector<Dim>(dims.begin(), dims.end())}};
-  if (op.op.starts_with("conv"))
-    settings.update({{"stride", s.conv.stride_w}, {"padding", s.conv.padding_w}});
-  if (op.op.starts_with("conv") || op.op == "linear" || op.op.ends_with("relu"))
-    settings["slope"] = s.negative_slope;
-  if (op.op == "take_runs") settings.update({{"first", s.first}, {"run", s.run}, {"step", s.step}});
-  if (op.op == "scale") settings["factor"] = s.factor;
-  if (op.op == "clamp") settings.update({{"low", s.low}, {"high", s.high}});
-  return settings;
-}
-
-OpenedStep open_step(Trainer& trainer, const OpeningOptions& options) {
+OpenedStep open_step(Trainer& trainer, const std::optional<std::string>& keep) {
   if (trainer.ranks() > 1)
     throw std::invalid_argument("open_step: expected a training in one process, found " +
                                 std::to_string(trainer.ranks()));
   OpenedStep opened{.step = trainer.step() + 1, .operators = Json::array(), .arrays = {}};
-  Opening opening(options, opened);
+  Opening opening(keep, opened);
   Update update(trainer, opening);
   const auto append = [&](const Json& more) {
     opened.operators.insert(opened.operators.end(), more.begin(), more.end());
@@ -314,15 +308,15 @@ std::optional<OperatorDifference> first_difference(const Json& one, const Json& 
     const Json &a = one[i], &b = other[i];
     const std::string name = a.at("name"), op = a.at("op");
     if (name != b.at("name")) refuse(name + " and " + b.at("name").get<std::string>());
-    const auto settings_of = [](const Json& ran) {
+    const auto settings_in = [](const Json& ran) {
       return ran.contains("settings") ? ran["settings"].dump() : "";
     };
     for (const char* field : {"inputs", "outputs"}) {
       const Json none = Json::array();
       const Json &x = a.contains(field) ? a[field] : none, &y = b.contains(field) ? b[field] : none;
       if (x.size() != y.size()) refuse(name + " with other " + field);
-      if (field == std::string("outputs") && settings_of(a) != settings_of(b))
-        return OperatorDifference{name, op, "the settings", settings_of(a), settings_of(b)};
+      if (field == std::string("outputs") && settings_in(a) != settings_in(b))
+        return OperatorDifference{name, op, "the settings", settings_in(a), settings_in(b)};
       for (std::size_t k = 0; k < x.size(); ++k)
         if (x[k] != y[k])
           return OperatorDifference{

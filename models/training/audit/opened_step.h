@@ -4,19 +4,14 @@
 // computed again.
 #pragma once
 
-#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
-#include "autograd/trace.h"
 #include "models/training/trainer.h"
 
 namespace supertac {
-
-/// What docs/audit.md calls the settings of an operator.
-nlohmann::ordered_json operator_settings(const TracedOp& op);
 
 struct OpenedStep {
   std::int64_t step = 0;  ///< from 1
@@ -26,18 +21,10 @@ struct OpenedStep {
   std::map<std::string, Tensor> arrays;
 };
 
-struct OpeningOptions {
-  /// The arrays of the operators whose name begins so are kept; empty: none are.
-  std::optional<std::string> keep = {};
-  /// Sees each result (output `index` of the operator `name`) before it is hashed and used, and may change
-  /// it: so tests plant what is to be found. Called by several threads.
-  std::function<void(const std::string& name, std::size_t index, const TracedOp& op, Tensor& result)> touch =
-      {};
-};
-
 /// Makes the next step of this trainer. Throws as Trainer::train_step(), and std::invalid_argument when it
-/// trains in several processes.
-OpenedStep open_step(Trainer& trainer, const OpeningOptions& options = {});
+/// trains in several processes. `keep`: the arrays of the operators whose name begins so are kept; empty:
+/// none are.
+OpenedStep open_step(Trainer& trainer, const std::optional<std::string>& keep = {});
 
 /// The first operator in which two openings of the same step differ.
 struct OperatorDifference {

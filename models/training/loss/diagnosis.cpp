@@ -2,12 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_set>
 
 namespace supertac {
 namespace {
 
 bool finite(const Tensor& t) {
   return std::ranges::all_of(t.values(), [](real x) { return std::isfinite(x); });
+}
+
+// y and every value it was computed from, in the order of computation; leaves (inputs, parameters) come
+// first.
+std::vector<Variable> history_of(const Variable& y) {
+  std::vector<Variable> history{y};
+  std::unordered_set<const void*> known{y.node()};
+  for (std::size_t i = 0; i < history.size(); ++i)
+    for (const Variable& x : inputs_of(history[i]))
+      if (known.insert(x.node()).second) history.push_back(x);
+  std::ranges::stable_sort(history, {}, [](const Variable& v) { return v.node()->number; });
+  return history;
 }
 
 const Parameter* parameter_of(const Variable& v, const std::vector<Parameter>& parameters) {

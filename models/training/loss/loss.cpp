@@ -5,10 +5,10 @@
 #include <span>
 #include <stdexcept>
 
-#include "autograd/checks.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/losses.h"
 #include "autograd/ops/vae.h"
+#include "autograd/record.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {

@@ -1,5 +1,5 @@
-// The plain loops of kernels/conv.cpp and ops/linear.cpp against those of kernels/fast: the same bits
-// where both add in the same order.
+// The plain loops of kernels/conv.cpp and ops/linear.cpp against those of kernels/fast on every instruction
+// set: the sets have the same bytes, and those of the plain loops where both add in the same order.
 #include "autograd/kernels/conv.h"
 
 #include "autograd/kernels/fast/isa/isa.h"
@@ -45,13 +45,22 @@ ConvSizes sizes_of(const ConvCase& c, bool transposed, bool flat) {
           c.cout};
 }
 
-// What `run` gives on the plain loops and on the chosen set, whose results must agree.
+// What `run` gives on the plain loops and on every set, whose results must agree.
 template <class Run>
 void expect_plain_is_fast(const char* what, bool same_order, Run run) {
   const IsaKernels& chosen = isa_kernels();
-  const Tensor fast = run();
-  use_isa(kPlainKernels);
-  const Tensor plain = run();
+  Tensor fast, plain;
+  for (const IsaKernels* set : supported_sets()) {
+    use_isa(*set);
+    const Tensor found = run();
+    if (set == &kPlainKernels) {
+      plain = found;
+    } else if (!fast.defined()) {
+      fast = found;
+    } else {
+      ASSERT_TRUE(same_bytes(found, fast)) << what << " on " << set->name;
+    }
+  }
   use_isa(chosen);
   double largest = 0;
   for (const real value : plain.values()) largest = std::max(largest, std::abs(static_cast<double>(value)));

@@ -35,18 +35,6 @@ TEST(KlDivergence, NearTheStandardNormal) {
   EXPECT_NEAR(static_cast<double>(kl_divergence(mean, log_var).item()), exact, 1e-7);
 }
 
-TEST(Vae, ExtremeLogVarianceStaysFinite) {
-  const Variable mean = parameter(Tensor::of({1, 3}, {0, 1, -1})),
-                 log_var = parameter(Tensor::of({1, 3}, {1000, -1000, 80}));
-  const Variable limited = clamp(log_var, -10, 10);
-  const Variable z = sample_gaussian(mean, limited, Tensor::full({1, 3}, 4));
-  backward(kl_divergence(mean, limited) + sum(z));
-  for (const Tensor& g : {mean.grad(), log_var.grad()}) {
-    for (const real x : g.values()) EXPECT_TRUE(std::isfinite(x));
-  }
-  expect_values(log_var.grad(), {1, 3}, {0, 0, 0});
-}
-
 TEST(Vae, Empty) {
   const Variable x = parameter(Tensor::zeros({0, 3}));
   backward(sum(sample_gaussian(x, x, Tensor::zeros({0, 3}))));

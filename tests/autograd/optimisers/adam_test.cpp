@@ -33,14 +33,6 @@ struct Reference {
   }
 };
 
-TEST(Adam, TheFirstStepIsTheLearningRateWhateverTheGradient) {
-  for (const double g : {1e-5, -1e-3, 1.0, 1e5}) {
-    Single s({.learning_rate = 0.1});
-    s.step(g);
-    EXPECT_NEAR(s.value(), 1 - (g > 0 ? 0.1 : -0.1) / (1 + 1e-8 / std::abs(g)), 1e-6) << g;
-  }
-}
-
 TEST(Adam, FollowsTheFormula) {
   const AdamOptions options{.learning_rate = 0.05, .beta1 = 0.8, .beta2 = 0.99, .epsilon = 1e-2};
   Single s(options);
@@ -51,14 +43,6 @@ TEST(Adam, FollowsTheFormula) {
     r.step(g, options);
     ASSERT_NEAR(s.value(), r.x, 2e-5) << "step " << i;
   }
-}
-
-// 1 - 0.999f is off by 1.3e-5; with constant gradients the bias-corrected moments are g and g^2 exactly.
-TEST(Adam, SecondMomentCarriesNoBias) {
-  Single s({});
-  s.step(1);
-  EXPECT_NEAR(static_cast<double>(s.adam.second_moments()[0].item()), 1e-3, 1e-9);
-  EXPECT_NEAR(static_cast<double>(s.adam.first_moments()[0].item()), 0.1, 1e-8);
 }
 
 TEST(Adam, ZeroGradientsForALongTimeChangeNothing) {
@@ -114,18 +98,6 @@ TEST(Adam, ClipsTheNormOverAllParameters) {
   Single below({.clip_norm = 1});
   below.step(0.5);
   EXPECT_NEAR(static_cast<double>(below.adam.first_moments()[0].item()), 0.05, 1e-8);
-}
-
-TEST(Adam, ContinuesFromSavedState) {
-  Single straight({}), first({});
-  for (int i = 0; i < 5; ++i) straight.step(i), first.step(i);
-  Single resumed({});
-  resumed.x.mutable_value() = first.x.value().clone();
-  resumed.adam.first_moments()[0] = first.adam.first_moments()[0].clone();
-  resumed.adam.second_moments()[0] = first.adam.second_moments()[0].clone();
-  resumed.adam.set_steps(first.adam.steps());
-  for (int i = 0; i < 5; ++i) straight.step(i), resumed.step(i);
-  EXPECT_EQ(straight.value(), resumed.value());
 }
 
 TEST(Adam, RefusesAStepWithoutAGradient) {

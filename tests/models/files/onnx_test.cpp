@@ -30,7 +30,7 @@ ModelFile model_of(const std::string& preset, const TaxelArray& array, Grouping 
 }
 
 // Fingers that press, each window as hard and as long as chance will have it; some are pressed all the time.
-Tensor volts_of(const Network& network, Dim count) {
+Tensor volts_of(const SuperTac& network, Dim count) {
   Tensor volts(network.input_shape(count));
   const RandomStream random(11, 3);
   const Dim frames = volts.dim(1), signals = volts.dim(2);

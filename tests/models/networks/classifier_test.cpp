@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "autograd/ops/losses.h"
-#include "autograd/optimisers/adam.h"
 #include "tests/expect_error.h"
 #include "tests/models/support.h"
 
@@ -36,29 +34,6 @@ TEST(TextureClassifier, RefusesSettingsOutOfRange) {
               std::string("TextureClassifier: expects sides of 1 to 2048, a channel or more and 2 to 1024 "
                           "classes, got ") +
                   got);
-}
-
-// Stripes along x against stripes along y.
-TEST(TextureClassifier, LearnsToTellTwoTextures) {
-  constexpr Dim kImages = 16;
-  Tensor x(Shape{kImages, 8, 8, 1});
-  std::vector<std::int32_t> labels;
-  for (Dim n = 0; n < kImages; ++n) {
-    labels.push_back(static_cast<std::int32_t>(n % 2));
-    for (Dim i = 0; i < 64; ++i) x.data()[n * 64 + i] = ((n % 2 ? i / 8 : i % 8) + n) % 4 < 2 ? 1 : 0;
-  }
-  Rng rng(2);
-  const TextureClassifier classifier({.height = 8, .width = 8, .classes = 2}, rng);
-  Adam adam(values_of(classifier.parameters()), {.learning_rate = 3e-3});
-  real loss_value = 0;
-  for (int step = 0; step < 60; ++step) {
-    const Variable loss = softmax_cross_entropy(classifier.forward(Variable(x)), labels);
-    adam.zero_grad();
-    backward(loss);
-    adam.step();
-    loss_value = loss.item();
-  }
-  EXPECT_LT(loss_value, 0.05);
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/losses.h"
-#include "autograd/ops/max_pool.h"
 #include "autograd/ops/shaping.h"
 #include "autograd/ops/vae.h"
 #include "layers/checkpoint.h"

@@ -104,17 +104,6 @@ TEST(Vae, LogVarianceIsClampedToTen) {
   EXPECT_EQ(most, 10);
 }
 
-TEST(SuperTac, EvaluationIsDeterministicAndUsesTheMean) {
-  const SuperTac model = random_network();
-  const Tensor windows = uniform({2, 32, 16}, 2);
-  std::array<Tensor, kGroups> zero;
-  for (Tensor& e : zero) e = Tensor::zeros({2, 3});
-  const Tensor a = model.infer(windows), b = model.infer(windows);
-  const Tensor c = model.forward(windows, zero).picture.value();
-  EXPECT_TRUE(std::ranges::equal(a.values(), b.values()));
-  EXPECT_TRUE(std::ranges::equal(a.values(), c.values()));
-}
-
 TEST(SuperTac, AWindowsPictureDoesNotDependOnItsBatch) {
   const SuperTac model = random_network();
   const Tensor two = uniform({2, 32, 16}, 4);

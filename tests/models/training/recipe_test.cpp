@@ -80,15 +80,14 @@ TEST(Recipe, RefusesWhatNoTrainingHas) {
   EXPECT_EQ(message([](Recipe& r) { r.range = Scaling{.rest = 1, .span = 0}; }),
             "recipe: expected a span that is not 0, got 0");
   EXPECT_NE(message([](Recipe& r) { r.leave_out = {"3_Bumps"}; }).find("--split texture"), std::string::npos);
-  EXPECT_EQ(message([](Recipe& r) { r.epochs = 0; }), "training settings: epochs must be 1 to 100000, got 0");
-  EXPECT_EQ(message([](Recipe& r) { r.batch = 5000; }),
-            "training settings: batch must be 1 to 4096, got 5000");
+  EXPECT_EQ(message([](Recipe& r) { r.epochs = 0; }), "recipe: expected epochs from 1 to 100000, got 0");
+  EXPECT_EQ(message([](Recipe& r) { r.batch = 5000; }), "recipe: expected batch from 1 to 4096, got 5000");
   EXPECT_EQ(message([](Recipe& r) { r.learning_rate = 2; }),
-            "training settings: learning rate must be above 0 and at most 1, got 2");
+            "recipe: expected learning_rate above 0 and at most 1, got 2");
   EXPECT_EQ(message([](Recipe& r) { r.warm_up = 1; }),
-            "training settings: warm-up must be a share of all steps, 0 to below 1, got 1");
+            "recipe: expected warm_up as a share of all steps, 0 to below 1, got 1");
   EXPECT_EQ(message([](Recipe& r) { r.clip_norm = -1; }),
-            "training settings: clip norm must not be negative (0 = never), got -1");
+            "recipe: expected clip_norm of 0 (never) or more, got -1");
   EXPECT_NE(message([](Recipe& r) { r.loss.beta = -1; }).find("beta = -1"), std::string::npos);
   EXPECT_NE(message([](Recipe& r) { r.model.latent = 0; }).find("latent"), std::string::npos);
 }

@@ -126,22 +126,6 @@ std::vector<std::uint32_t> first(std::uint32_t count) {
   return indices;
 }
 
-TEST(Trainer, LearnsFromSingleFrames) {
-  const WindowSet frames = blobs();
-  Recipe settings = small_frames();
-  settings.epochs = 60;
-  settings.learning_rate = 5e-3;
-  Trainer trainer(frames, first(32), Objective(frames, settings));
-  const double before = trainer.train_step().l2;
-  double after = 0;
-  while (!trainer.done()) after = trainer.train_step().l2;
-  EXPECT_LT(after, before / 10);
-  const std::vector<std::uint32_t> unseen = {32, 33, 34, 35, 36, 37, 38, 39};
-  const Metrics scores = score(Ensemble({CompiledModel(trainer.model())}), frames, unseen).contact();
-  EXPECT_EQ(scores.windows, 8u);
-  EXPECT_GT(scores.psnr_mean_db, 18);
-}
-
 using MakeTrainer = std::function<Trainer()>;
 
 std::string checkpoint_of(const MakeTrainer& make, int threads, std::int64_t interrupted_after) {

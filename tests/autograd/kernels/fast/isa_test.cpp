@@ -1,11 +1,9 @@
-// All instruction sets give the same bytes.
+// All instruction sets give the same bytes; kernels/conv_test.cpp compares convolutions and linear layers.
 #include "autograd/kernels/fast/isa/isa.h"
 
 #include <algorithm>
 #include <limits>
 
-#include "autograd/kernels/fast/winograd.h"
-#include "autograd/kernels/sums.h"
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/attention.h"
@@ -73,60 +71,6 @@ Tensor gather(const IsaKernels& isa, const std::vector<Phase>& phases, const Ten
               bias == nullptr ? Into::add : Into::overwrite, bias == nullptr ? real(1) : real(0.25)},
              x.data(), y.data());
   return y;
-}
-
-TEST(Isa, GatherForwardAndBackward) {
-  for (const ConvSettings& s : kSettings) {
-    const Geometry& g = geometry_of(s);
-    for (const Dim cin : kChannels) {
-      for (const Dim cout : kChannels) {
-        const Tensor x = numbers({g.in_pixels, cin}), gy = numbers({g.out_pixels, cout}, 2),
-                     bias = numbers({cout}, 3);
-        const Tensor w = numbers({g.taps, cin, cout}, 4), wt = numbers({g.taps, cout, cin}, 5);
-        const Tensor gx = numbers({g.in_pixels, cin}, 6);
-        expect_same_on_all_sets(channels(cin, cout), [&](const IsaKernels& isa) {
-          return std::vector{gather(isa, g.forward, x, w, &bias, Tensor({g.out_pixels, cout}), cin, cout),
-                             gather(isa, g.backward, gy, wt, nullptr, gx.clone(), cout, cin)};
-        });
-      }
-    }
-  }
-}
-
-TEST(Isa, GatherRows) {
-  for (const Dim rows : {1, 3, 6, 8, 16, 31}) {
-    for (const Dim cin : kChannels) {
-      for (const Dim cout : kChannels) {
-        const Tensor x = numbers({rows, cin}), w = numbers({cin, cout}, 2), bias = numbers({cout}, 3);
-        expect_same_on_all_sets(
-            std::to_string(rows) + " rows, " + channels(cin, cout), [&](const IsaKernels& isa) {
-              Tensor y({rows, cout});
-              isa.gather_rows({nullptr, w.data(), bias.data(), cin, cout}, x.data(), y.data(), rows);
-              return std::vector{y};
-            });
-      }
-    }
-  }
-}
-
-TEST(Isa, Outer) {
-  constexpr Dim kImages = 5;
-  for (const ConvSettings& s : kSettings) {
-    const Geometry& g = geometry_of(s);
-    for (const Dim cin : kChannels) {
-      for (const Dim cout : kChannels) {
-        const Tensor x = numbers({kImages, g.in_pixels, cin}), gy = numbers({kImages, g.out_pixels, cout}, 2);
-        const Tensor start = numbers({cin, cout}, 3);
-        expect_same_on_all_sets(channels(cin, cout), [&](const IsaKernels& isa) {
-          Tensor gw = start.clone();
-          for (const TapPairs& pairs : g.pairs)
-            isa.outer(
-                {&pairs, x.data(), gy.data(), gw.data(), kImages, g.in_pixels, g.out_pixels, cin, cout});
-          return std::vector{gw};
-        });
-      }
-    }
-  }
 }
 
 // A sum that is -0 so far stays -0 where a tap is skipped, and becomes +0 where 0 * w is added: which of the
@@ -214,12 +158,6 @@ std::vector<Tensor> results_of_loops(Dim n) {
   }
   rows.push_back(parameter.grad());
   rows.push_back(parameter.value());
-  std::vector<Tensor> parts(8);
-  std::vector<const real*> streams;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    streams.push_back((parts[i] = awkward(n, i)).data());
-    add_as_tree(n, streams, rows.emplace_back(Shape{n}).data());
-  }
   return rows;
 }
 
@@ -227,21 +165,6 @@ TEST(Isa, PlainLoops) {
   for (const Dim n : {1, 5, 16, 33, 100, 257})
     expect_same_on_all_sets(std::to_string(n) + " numbers",
                             [&](const IsaKernels&) { return results_of_loops(n); });
-}
-
-TEST(Isa, Winograd) {
-  const ConvSettings map{
-      .height = 8, .width = 12, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1};
-  const ConvTask sizes{&geometry_of(map), 5, 48, 16};
-  const Tensor x = numbers({5, 96, 48}), w = numbers({9, 48, 16}, 2), bias = numbers({16}, 3);
-  const Tensor gy = numbers({5, 96, 16}, 4);
-  expect_same_on_all_sets("y, gx, gw", [&](const IsaKernels&) {
-    Tensor y(gy.shape()), gx = numbers(x.shape(), 5), gw = numbers(w.shape(), 6);
-    winograd_conv(sizes, x.data(), w.data(), bias.data(), 0.25F, y.data());
-    winograd_grad_x(sizes, gy.data(), w.data(), Into::add, gx.data());
-    winograd_grad_w(sizes, x.data(), gy.data(), Into::add, gw.data());
-    return std::vector{y, gx, gw};
-  });
 }
 
 TEST(Isa, TheChosenSetIsOneOfThem) {

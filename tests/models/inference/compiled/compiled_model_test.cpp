@@ -11,11 +11,8 @@
 #include <vector>
 
 #include "autograd/kernels/fast/isa/isa.h"
-#include "autograd/ops/max_pool.h"
-#include "autograd/ops/shaping.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/random.h"
-#include "layers/convolution.h"
 #include "models/inference/compiled/compiler.h"
 #include "tests/expect_error.h"
 #include "tests/models/support.h"
@@ -39,7 +36,7 @@ void expect_close(const Tensor& a, const Tensor& b, const std::string& what) {
   EXPECT_LE(difference, 1e-5 * std::max(1.0, largest)) << what;
 }
 
-void expect_same_estimate(const Network& network, Dim count, const std::string& what) {
+void expect_same_estimate(const SuperTac& network, Dim count, const std::string& what) {
   const Tensor inputs = uniform(network.input_shape(count), 7);
   const Estimate forward = network.estimate(inputs), compiled = CompiledModel(network).estimate(inputs);
   expect_close(forward.picture, compiled.picture, what + " picture");
@@ -82,43 +79,6 @@ TEST(CompiledModel, DrawsWhatTheNetworkDrawsForPresets) {
     expect_same_estimate(random_network(SuperTacSettings::of_preset(preset)), 9, preset);
 }
 
-// No network of ours joins maps, convolves its input as it is, takes runs of anything but that, or pools.
-class Odd : public Network {
- public:
-  enum Kind { joins_maps, convolves_input, takes_runs, pools };
-  explicit Odd(Kind kind) : kind_(kind), a_(2, 5, kSameSize, rng_) {}
-  NetworkFormat format() const override { return {.columns = 6, .channels = 2, .scale = 1}; }
-  Shape input_shape(Dim count) const override {
-    return kind_ == convolves_input ? Shape{count, 4, 6, 2} : Shape{count, 1, 48};
-  }
-  Prediction draw(const Variable& x) const override {
-    if (kind_ == convolves_input) return {a_.forward(x), {}, {}};
-    const Variable frame = last_frame(x, 4, 6, 2), maps[] = {a_.forward(frame), a_.forward(frame, kRelu)};
-    if (kind_ == joins_maps) return {concat(maps), {}, {}};
-    if (kind_ == pools) return {max_pool2d(maps[0]), {}, {}};
-    return {take_runs(maps[0], {0, 5, 5, 5}), {}, {}};
-  }
-
- private:
-  Rng rng_{3};
-  Kind kind_;
-  Conv2d a_;
-};
-
-TEST(CompiledModel, RefusesWhatNoNetworkOfOursDoes) {
-  const std::pair<Odd::Kind, const char*> refused[] = {
-      {Odd::joins_maps, "CompiledModel: a concat of maps has no step"},
-      {Odd::convolves_input, "CompiledModel: conv2d has a step for anything but the network's input"},
-      {Odd::takes_runs, "CompiledModel: take_runs has a step for the network's input only"},
-      {Odd::pools,
-       "CompiledModel: no step computes the op max_pool2d; models/inference/compiled/plan_steps.cpp lists "
-       "those "
-       "that "
-       "have one"}};
-  for (const auto& [kind, text] : refused)
-    EXPECT_EQ(what_of<std::logic_error>([&kind = kind] { const CompiledModel p{Odd(kind)}; }), text);
-}
-
 // All pictures of 64 windows, `batch` at a time.
 Tensor in_batches(const CompiledModel& network, const Tensor& windows, Dim batch) {
   Tensor all(network.network().picture_shape(windows.dim(0)));
@@ -134,7 +94,7 @@ Tensor in_batches(const CompiledModel& network, const Tensor& windows, Dim batch
   return all;
 }
 
-CompiledModel prepare(const Network& network, bool bytes) {
+CompiledModel prepare(const SuperTac& network, bool bytes) {
   if (!bytes) return CompiledModel(network);
   ActivationRanges ranges;
   ranges.add(network, uniform(network.input_shape(16), 5));
@@ -172,20 +132,25 @@ INSTANTIATE_TEST_SUITE_P(All, CompiledBits,
 // transformed on the way.
 TEST(CompiledModel, OfAnyCacheHasTheSameBits) {
   const SuperTac network = random_network(SuperTacSettings::of_preset("paper"), 4);
+  const kernels::IsaKernels& before = isa_kernels();
   std::set<bool> seen;
   for (const Dim count : {1, 2, 3, 17}) {
     const Tensor windows = uniform(network.input_shape(count), 6);
     const Estimate expected = Compiler::plan(network, 0)->run(windows);
-    for (const std::size_t megabytes : {1, 2, 3, 4, 64}) {
-      const auto plan = Compiler::plan(network, megabytes << 20);
-      seen.insert(plan->filters_anew());
-      const Estimate found = plan->run(windows);
-      EXPECT_TRUE(std::ranges::equal(expected.picture.values(), found.picture.values()))
-          << megabytes << " MB";
-      EXPECT_TRUE(std::ranges::equal(expected.predicted_error.values(), found.predicted_error.values()))
-          << megabytes << " MB";
-    }
+    for (const std::size_t megabytes : {1, 2, 3, 4, 64})
+      for (const kernels::IsaKernels* set : supported_sets()) {
+        if (set == &kernels::kPlainKernels || (set == &kernels::kPortableKernels && count > 1)) continue;
+        use_isa(*set);
+        const auto plan = Compiler::plan(network, megabytes << 20);
+        seen.insert(plan->filters_anew());
+        const Estimate found = plan->run(windows);
+        const std::string what = std::to_string(megabytes) + " MB, " + std::string(set->name);
+        EXPECT_TRUE(std::ranges::equal(expected.picture.values(), found.picture.values())) << what;
+        EXPECT_TRUE(std::ranges::equal(expected.predicted_error.values(), found.predicted_error.values()))
+            << what;
+      }
   }
+  use_isa(before);
   EXPECT_EQ(seen.size(), 2U);
 }
 
@@ -198,70 +163,6 @@ TEST(CompiledModel, InBytesDrawsNearlyTheSame) {
     for (Dim i = 0; i < exact.picture.size(); ++i)
       ASSERT_NEAR(exact.picture.data()[i], bytes.picture.data()[i], 0.1 * (high - low)) << "seed " << seed;
   }
-}
-
-// Each op's map, in the order of the ops; a linear layer before a map leaves its numbers pixel by pixel.
-TEST(CompiledModel, ShowsEveryMapOnItsWay) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
-    const SuperTac network = random_network(random_settings(seed), seed);
-    const Tensor input = uniform(network.input_shape(1), 5);
-    std::vector<std::pair<std::string, std::vector<real>>> ops, shown;
-    const auto numbers = [](const Tensor& t) { return std::vector(t.values().begin(), t.values().end()); };
-    {
-      const TracedPrediction traced(network, input);
-      for (const TracedOp& op : traced.trace.ops())
-        if (op.op != "flatten_channels_first") ops.emplace_back(op.op, numbers(op.y.value()));
-    }
-    const CompiledModel compiled(network);
-    const Estimate drawn = compiled.watched(
-        input, [&](const std::string& step, const Tensor& map) { shown.emplace_back(step, numbers(map)); });
-    EXPECT_TRUE(std::ranges::equal(drawn.picture.values(), compiled.estimate(input).picture.values()));
-    ASSERT_EQ(ops.size(), shown.size());
-    for (std::size_t i = 0; i < ops.size(); ++i) {
-      EXPECT_EQ(ops[i].first, shown[i].first);
-      if (ops[i].first == "linear")
-        for (auto* values : {&ops[i].second, &shown[i].second}) std::ranges::sort(*values);
-      ASSERT_EQ(ops[i].second.size(), shown[i].second.size()) << i << ' ' << ops[i].first;
-      for (std::size_t k = 0; k < ops[i].second.size(); ++k)
-        ASSERT_NEAR(ops[i].second[k], shown[i].second[k], 1e-4) << i << ' ' << ops[i].first;
-    }
-  }
-}
-
-TEST(CompiledModel, InBytesShowsItsMapsAsWhatTheyStandFor) {
-  const SuperTac network =
-      random_network({.timesteps = 32, .latent = 3, .scale = 4, .channels = 8, .rcabs = 1});
-  const Tensor input = uniform(network.input_shape(1), 5);
-  std::map<std::string, std::vector<real>> bytes;
-  const auto into = [](auto& maps) {
-    return [&maps](const std::string& step, const Tensor& map) {
-      maps[step] = std::vector(map.values().begin(), map.values().end());
-    };
-  };
-  const CompiledModel in_bytes = prepare(network, true);
-  const Estimate drawn = in_bytes.watched(input, into(bytes));
-  EXPECT_TRUE(std::ranges::equal(bytes.at("upsampler.out"), drawn.picture.values()));
-  EXPECT_TRUE(std::ranges::equal(in_bytes.estimate(input).picture.values(), drawn.picture.values()));
-  std::map<const void*, std::string> names;
-  for (const Parameter& p : network.parameters()) names[p.value.node()] = p.name;
-  std::size_t compared = 0;
-  const TracedPrediction traced(network, input);
-  for (const TracedOp& op : traced.trace.ops()) {
-    std::string layer = op.inputs.size() < 2 ? "" : names[op.inputs[1].node()];
-    layer = layer.substr(0, layer.rfind('.'));
-    if (!bytes.contains(layer) || layer == "upsampler.fc") continue;  // whose numbers lie pixel by pixel
-    const auto exact = op.y.value().values();
-    const auto [low, high] = std::ranges::minmax(exact);
-    ASSERT_EQ(bytes.at(layer).size(), exact.size()) << layer;
-    for (std::size_t i = 0; i < exact.size(); ++i)
-      ASSERT_NEAR(bytes.at(layer)[i], exact[i], 0.1F * (high - low) + 0.01F) << layer << ' ' << i;
-    ++compared;
-  }
-  EXPECT_GT(compared, 20U);
-  for (const real gate : bytes.at("sigmoid")) EXPECT_TRUE(gate > 0.2F && gate < 0.8F) << gate;
-  EXPECT_EQ(what_of<std::invalid_argument>(
-                [&] { in_bytes.watched(uniform(network.input_shape(2), 5), into(bytes)); }),
-            "CompiledModel: one window is watched, got [2,32,16]");
 }
 
 TEST(CompiledModel, RefusesTheRangesOfAnotherNetwork) {

@@ -9,8 +9,6 @@
 #include <cstdlib>
 #include <set>
 
-#include "autograd/kernels/conv.h"
-#include "autograd/ops/linear.h"
 #include "io/files/safetensors.h"
 #include "models/training/audit/ledger.h"
 #include "tests/expect_error.h"
@@ -35,24 +33,6 @@ void flip_in_file(const std::string& path, const std::string& tensor, std::size_
   write_safetensors(path, file.metadata(), tensors);
 }
 
-/// What the op makes when the channels of its input are added up from the last to the first.
-Tensor in_another_order(const TracedOp& op) {
-  const Tensor &x = op.inputs[0].value(), &w = op.inputs[1].value(), &bias = op.inputs[2].value();
-  const Dim cin = w.dim(w.rank() - 2), cout = w.dim(w.rank() - 1);
-  Tensor from = x.clone(), weights = w.clone(), y(op.y.shape());
-  for (Dim i = 0; i < x.size(); ++i) from.data()[i] = x.data()[i / cin * cin + cin - 1 - i % cin];
-  for (Dim i = 0; i < w.size() / cout; ++i)
-    std::copy_n(w.data() + (i / cin * cin + cin - 1 - i % cin) * cout, cout, weights.data() + i * cout);
-  const real slope = op.settings.negative_slope;
-  if (op.op == "linear") {
-    kernels::linear(x.dim(0), cin, cout, from.data(), weights.data(), bias.data(), slope, y.data());
-  } else {
-    kernels::conv({op.settings.conv, x.dim(0), cin, cout}, from.data(), weights.data(), bias.data(), slope,
-                  y.data());
-  }
-  return y;
-}
-
 std::optional<Dim> first_different_entry(const Tensor& one, const Tensor& other) {
   for (Dim i = 0; one.size() == other.size() && i < one.size(); ++i)
     if (std::bit_cast<std::uint32_t>(one.data()[i]) != std::bit_cast<std::uint32_t>(other.data()[i]))
@@ -73,10 +53,10 @@ class OpenedSteps : public testing::Test {
     right_ = opened(small_.windows);
   }
   std::string state() const { return folder_.file("state.safetensors"); }
-  OpenedStep opened(const WindowSet& windows, const OpeningOptions& options = {}) const {
+  OpenedStep opened(const WindowSet& windows, const Keep& keep = {}) const {
     Trainer trainer(windows, all_of(windows), Objective(windows, small_.recipe));
     trainer.restore(state(), {});
-    return open_step(trainer, options);
+    return open_step(trainer, keep);
   }
   /// The names of those that `wants` holds of.
   std::vector<std::string> operators(const auto& wants) const {
@@ -96,7 +76,7 @@ class OpenedSteps : public testing::Test {
   std::optional<Found> found(const std::function<OpenedStep(const Keep& keep)>& planted) const {
     const auto at = first_difference(right_.operators, planted({}).operators);
     if (!at) return std::nullopt;
-    const Tensor one = opened(small_.windows, {.keep = at->name}).arrays.at(at->one),
+    const Tensor one = opened(small_.windows, at->name).arrays.at(at->one),
                  other = planted(at->name).arrays.at(at->other);
     const Dim entry = first_different_entry(one, other).value();
     return Found{
@@ -173,7 +153,7 @@ TEST_F(OpenedSteps, AFlippedBitOfTheStateIsFound) {
       const std::uint32_t bit = random_bit();
       const auto at = found([&](const Keep& keep) {
         flip_in_file(state(), tensor, entry, bit);
-        const OpenedStep step = opened(small_.windows, {.keep = keep});
+        const OpenedStep step = opened(small_.windows, keep);
         write_file(state(), kept);
         return step;
       });
@@ -181,51 +161,6 @@ TEST_F(OpenedSteps, AFlippedBitOfTheStateIsFound) {
       EXPECT_EQ(at->name, name);
       EXPECT_EQ(at->bits, 1U << bit) << name;
     }
-  }
-}
-
-TEST_F(OpenedSteps, AFlippedBitOfAGradientIsFoundWithItsEntry) {
-  const std::vector<std::string> reversed =
-      operators([](const auto& ran) { return ran.contains("gy") && ran["outputs"][0] != ""; });
-  for (int plant = 0; plant < plants(); ++plant) {
-    const std::string name = one_of(reversed);
-    const std::uint32_t bit = random_bit();
-    const double where = random_.uniform(next_++);
-    Dim entry = 0;
-    const auto touch = [&](const auto& of, std::size_t index, const auto&, Tensor& result) {
-      if (of != name || index != 0) return;
-      entry = static_cast<Dim>(where * static_cast<double>(result.size()));
-      flip(result.data()[entry], bit);
-    };
-    const auto at =
-        found([&](const Keep& keep) { return opened(small_.windows, {.keep = keep, .touch = touch}); });
-    ASSERT_TRUE(at) << name;
-    EXPECT_EQ(at->name, name);
-    EXPECT_EQ(at->entry, entry) << name;
-    EXPECT_EQ(at->bits, 1U << bit) << name;
-  }
-}
-
-TEST_F(OpenedSteps, AnotherOrderOfAdditionsIsFoundWithItsFirstEntry) {
-  const std::vector<std::string> products = operators([](const auto& ran) {
-    return !ran.contains("gy") &&
-           (ran["op"].template get<std::string>().starts_with("conv") || ran["op"] == "linear");
-  });
-  for (int plant = 0; plant < plants();) {
-    const std::string name = one_of(products);
-    Dim entry = 0;
-    const auto touch = [&](const auto& of, std::size_t, const auto& op, Tensor& result) {
-      if (of != name) return;
-      const Tensor other = in_another_order(op);
-      entry = first_different_entry(result, other).value_or(0);
-      std::copy_n(other.data(), other.size(), result.data());
-    };
-    const auto at =
-        found([&](const Keep& keep) { return opened(small_.windows, {.keep = keep, .touch = touch}); });
-    if (!at) continue;  // a sum that comes out the same
-    EXPECT_EQ(at->name, name);
-    EXPECT_EQ(at->entry, entry) << name;
-    ++plant;
   }
 }
 
@@ -243,7 +178,7 @@ TEST_F(OpenedSteps, AnotherSampleIsFoundWithItsMicroBatch) {
     const WindowSet other = small_windows(small_.recipe.model, 150, [&](Recording& r) {
       if (r.trial == static_cast<int>(pass) + 1) r.signals[frame * kTaxels] = 2.0F;
     });
-    const auto at = found([&](const Keep& keep) { return opened(other, {.keep = keep}); });
+    const auto at = found([&](const Keep& keep) { return opened(other, keep); });
     ASSERT_TRUE(at);
     EXPECT_EQ(at->name, std::to_string(slot) + "/windows");  // eight micro-batches of one example
     ++plant;

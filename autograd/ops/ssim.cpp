@@ -1,13 +1,13 @@
-#include "autograd/kernels/ssim.h"
-
+// Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004) and its gradient.
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "autograd/kernels/fast/each.h"
 #include "autograd/kernels/fast/pool.h"
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/losses.h"
 
-namespace supertac::kernels {
+namespace supertac {
 namespace {
 
 constexpr real kC1 = real(0.01 * 0.01), kC2 = real(0.03 * 0.03);  // (K1 L)^2, (K2 L)^2 with range L = 1
@@ -19,7 +19,7 @@ struct Window {
 
 // exp(-d^2 / (2 * 1.5^2)) for d = 0 to 5; the last bit of the C library's exp depends on the processor
 constexpr double kGaussian[] = {1,
-                                0.80073740291680806,
+                                0.8007374029168081,
                                 0.41111229050718745,
                                 0.1353352832366127,
                                 0.028565500784550377,
@@ -116,8 +116,8 @@ class SsimImage {
   }
 
   real centre(const real* x, real* to) const {
-    const auto mean =
-        static_cast<real>(sum_of(h_ * wd_, [x](Dim i) { return x[i]; }) / static_cast<double>(h_ * wd_));
+    const auto mean = static_cast<real>(kernels::sum_of(h_ * wd_, [x](Dim i) { return x[i]; }) /
+                                        static_cast<double>(h_ * wd_));
     for (Dim i = 0; i < h_ * wd_; ++i) to[i] = x[i] - mean;
     return mean;
   }
@@ -129,40 +129,37 @@ class SsimImage {
   }
 
   // [h, w] -> [oh, ow]: columns first, then rows
-  void blur(const real* from, real* __restrict to) {
-    real* __restrict columns = map(10);
+  void blur(const real* from, real* to) {
+    real* columns = map(10);
     std::fill_n(columns, oh_ * wd_, real(0));
-    for (Dim y = 0; y < oh_; ++y) {
-      for (Dim k = 0; k < w_.size; ++k) {
-        const real weight = w_.weight[static_cast<std::size_t>(k)];
-        for (Dim x = 0; x < wd_; ++x) columns[y * wd_ + x] += weight * from[(y + k) * wd_ + x];
-      }
-    }
+    add_windows(wd_, from, {wd_, wd_}, nullptr, columns, {wd_, 0});
     std::fill_n(to, oh_ * ow_, real(0));
-    for (Dim y = 0; y < oh_; ++y) {
-      for (Dim k = 0; k < w_.size; ++k) {
-        const real weight = w_.weight[static_cast<std::size_t>(k)];
-        for (Dim x = 0; x < ow_; ++x) to[y * ow_ + x] += weight * columns[y * wd_ + x + k];
-      }
-    }
+    add_windows(ow_, columns, {wd_, 1}, nullptr, to, {ow_, 0});
   }
 
   // gx += factor * blur^T(from), factor per pixel (null: 1)
   void add_transposed_blur(const real* from, const real* factor, real* gx) {
-    real* __restrict columns = map(10);
+    real* columns = map(10);
     std::fill_n(columns, oh_ * wd_, real(0));
+    add_windows(ow_, from, {ow_, 0}, nullptr, columns, {wd_, 1});
+    add_windows(wd_, columns, {wd_, 0}, factor, gx, {wd_, wd_});
+  }
+
+  // to[y, k, x] += weight[k] from[y, k, x] factor[y, k, x] for y < oh, the k of the window and x < width,
+  // each at y line + k step + x of its array; factor's are those of `to`
+  struct Walk {
+    Dim line, step;
+  };
+  void add_windows(Dim width, const real* from, Walk f, const real* factor, real* __restrict to, Walk t) {
     for (Dim y = 0; y < oh_; ++y) {
       for (Dim k = 0; k < w_.size; ++k) {
         const real weight = w_.weight[static_cast<std::size_t>(k)];
-        for (Dim x = 0; x < ow_; ++x) columns[y * wd_ + x + k] += weight * from[y * ow_ + x];
-      }
-    }
-    for (Dim y = 0; y < oh_; ++y) {
-      for (Dim k = 0; k < w_.size; ++k) {
-        const real weight = w_.weight[static_cast<std::size_t>(k)];
-        const Dim row = (y + k) * wd_;
-        for (Dim x = 0; x < wd_; ++x) {
-          gx[row + x] += weight * columns[y * wd_ + x] * (factor != nullptr ? factor[row + x] : 1);
+        const real* at = from + y * f.line + k * f.step;
+        const Dim first = y * t.line + k * t.step;
+        if (factor == nullptr) {
+          for (Dim x = 0; x < width; ++x) to[first + x] += weight * at[x];
+        } else {
+          for (Dim x = 0; x < width; ++x) to[first + x] += weight * at[x] * factor[first + x];
         }
       }
     }
@@ -179,22 +176,34 @@ class SsimImage {
 
 }  // namespace
 
-double ssim(const ImageSizes& s, const real* x, const real* target) {
-  const Window window = window_for(s.height, s.width);
-  const Dim pixels = s.height * s.width;
-  SsimImage image(window, s.height, s.width);
+// x, target [N,H,W,1];  value = mean over images and positions of SSIM
+// gx = gy d value / dx; the target is a constant
+Variable ssim(const Variable& x, const Tensor& target) {
+  check_rank("ssim", "x", x, 4);
+  if (target.shape() != x.shape()) {
+    refuse("ssim", "x and target must have the same shape, got " + x.shape().text() + " and " +
+                       target.shape().text());
+  }
+  if (x.dim(0) < 1 || x.dim(3) != 1 || std::min(x.dim(1), x.dim(2)) < 3) {
+    refuse("ssim", "x expects [N,H,W,1] with H, W >= 3, got " + x.shape().text());
+  }
+  const Dim images = x.dim(0), height = x.dim(1), width = x.dim(2), pixels = height * width;
+  const Window window = window_for(height, width);
+  SsimImage image(window, height, width);
   double total = 0;
-  for (Dim n = 0; n < s.images; ++n) total += image.value(x + n * pixels, target + n * pixels);
-  return total / static_cast<double>(s.images);
+  for (Dim n = 0; n < images; ++n)
+    total += image.value(x.value().data() + n * pixels, target.data() + n * pixels);
+  const auto value = static_cast<real>(total / static_cast<double>(images));
+  const auto reverse = [=](Backward& g) {
+    Tensor* gx = g.grad_of(0);
+    if (gx == nullptr) return;
+    SsimImage again(window, height, width);
+    const real each_image = g.gy().item() / static_cast<real>(images);
+    for (Dim n = 0, at = 0; n < images; ++n, at += pixels)
+      again.add_gradient(g.value(0).data() + at, target.data() + at, each_image, gx->data() + at);
+  };
+  const OpSettings settings{.constant = target};
+  return record("ssim", Tensor::full({}, value), {&x}, reverse, &settings);
 }
 
-void ssim_grad(const ImageSizes& s, real g, const real* x, const real* target, real* gx) {
-  const Window window = window_for(s.height, s.width);
-  const Dim pixels = s.height * s.width;
-  const real each = g / static_cast<real>(s.images);
-  SsimImage image(window, s.height, s.width);
-  for (Dim n = 0; n < s.images; ++n)
-    image.add_gradient(x + n * pixels, target + n * pixels, each, gx + n * pixels);
-}
-
-}  // namespace supertac::kernels
+}  // namespace supertac
