@@ -13,10 +13,9 @@ namespace {
 
 Tensor weights_for(const Shape& shape) {
   Tensor r(shape);
-  for (Dim i = 0; i < r.size(); ++i) {
+  for (Dim i = 0; i < r.size(); ++i)
     r.data()[i] = static_cast<real>(0.5 + std::fmod(0.61803398875 * static_cast<double>(i + 1), 1.0)) *
                   (i % 3 == 1 ? -1 : 1);
-  }
   return r;
 }
 
@@ -27,9 +26,8 @@ double weighted_sum(const Function& f) {
   const Variable y = f();
   const Tensor r = weights_for(y.shape());
   double total = 0;
-  for (Dim i = 0; i < r.size(); ++i) {
+  for (Dim i = 0; i < r.size(); ++i)
     total += static_cast<double>(y.value().data()[i]) * static_cast<double>(r.data()[i]);
-  }
   return total;
 }
 
@@ -87,10 +85,9 @@ std::string GradientReport::text() const {
   out.precision(10);
   if (entries > 0)
     out << wrong << " of " << entries << " entries off by more than " << kGradientTolerance << '\n';
-  for (const GradientEntry& e : worst) {
+  for (const GradientEntry& e : worst)
     out << e.place << ": analytic " << e.analytic << ", numeric " << e.numeric << ", relative error "
         << e.relative_error << '\n';
-  }
   return out.str();
 }
 
