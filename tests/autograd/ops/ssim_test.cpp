@@ -88,16 +88,6 @@ TEST(Ssim, VariancesSurviveAHighLevel) {
   EXPECT_NEAR(similarity(x, y), by_definition(x, y), sizeof(real) == 4 ? 1e-4 : 1e-11);
 }
 
-TEST(Ssim, AveragesOverImages) {
-  Tensor x({2, 16, 16, 1}), y({2, 16, 16, 1});
-  const Tensor a = textured(16), b = textured(16, 0.4, 0.1), c = flat(16, 0.3);
-  std::copy_n(a.data(), 256, x.data());
-  std::copy_n(b.data(), 256, x.data() + 256);
-  std::copy_n(c.data(), 256, y.data());
-  std::copy_n(a.data(), 256, y.data() + 256);
-  EXPECT_NEAR(similarity(x, y), (similarity(a, c) + similarity(b, a)) / 2, kRounding);
-}
-
 TEST(Ssim, GradientIsFiniteEverywhere) {
   for (const Dim size : {7, 8, 16}) {
     for (const Tensor& x :
