@@ -41,12 +41,12 @@ Window window_for(Dim height, Dim width) {
 // E[x]^2 of values far from zero cancels in fp32 and can turn negative.
 class SsimImage {
  public:
-  SsimImage(const Window& window, Dim height, Dim width)
-      : w_(window),
+  SsimImage(Dim height, Dim width)
+      : w_(window_for(height, width)),
         h_(height),
         wd_(width),
-        oh_(height - window.size + 1),
-        ow_(width - window.size + 1),
+        oh_(height - w_.size + 1),
+        ow_(width - w_.size + 1),
         store_(static_cast<std::size_t>(kMaps * height * width)) {}
 
   // The mean over positions.
@@ -165,7 +165,7 @@ class SsimImage {
     }
   }
 
-  const Window& w_;
+  Window w_;
   Dim h_, wd_, oh_, ow_;
   Scratch<real> store_;
   real *const a_ = map(0), *const b_ = map(1);  // the two images less their means
@@ -188,8 +188,7 @@ Variable ssim(const Variable& x, const Tensor& target) {
     refuse("ssim", "x expects [N,H,W,1] with H, W >= 3, got " + x.shape().text());
   }
   const Dim images = x.dim(0), height = x.dim(1), width = x.dim(2), pixels = height * width;
-  const Window window = window_for(height, width);
-  SsimImage image(window, height, width);
+  SsimImage image(height, width);
   double total = 0;
   for (Dim n = 0; n < images; ++n)
     total += image.value(x.value().data() + n * pixels, target.data() + n * pixels);
@@ -197,7 +196,7 @@ Variable ssim(const Variable& x, const Tensor& target) {
   const auto reverse = [=](Backward& g) {
     Tensor* gx = g.grad_of(0);
     if (gx == nullptr) return;
-    SsimImage again(window, height, width);
+    SsimImage again(height, width);
     const real each_image = g.gy().item() / static_cast<real>(images);
     for (Dim n = 0, at = 0; n < images; ++n, at += pixels)
       again.add_gradient(g.value(0).data() + at, target.data() + at, each_image, gx->data() + at);
