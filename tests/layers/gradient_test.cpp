@@ -50,7 +50,8 @@ struct Planted : ReverseWatch {
 TEST(OpGradients, APlantedErrorIsFoundAndNamed) {
   std::string last;
   for (const GradientCase& c : op_cases()) {
-    if (std::exchange(last, c.name) == c.name) continue;
+    // One case of each op, of more than one number: those have no other index.
+    if (c.leaves[0].size() == 1 || std::exchange(last, c.name) == c.name) continue;
     for (std::size_t input = 0; input < c.leaves.size(); ++input) {
       for (const Planted::Kind kind : {Planted::sign, Planted::twice, Planted::index}) {
         if (kind == Planted::index && c.name == "sum") continue;  // the same number at every index
