@@ -100,7 +100,9 @@ void Bicubic::operator()(std::span<const float> frame, std::span<float> out) con
 }
 
 UpsampledFrame::UpsampledFrame(const WindowSet& windows, std::span<const std::uint32_t> train)
-    : array_(windows.array()), upsampling_(array_.rows, array_.columns, windows.scale()) {
+    : array_(windows.array()),
+      delay_frames_(windows.delay_frames()),
+      upsampling_(array_.rows, array_.columns, windows.scale()) {
   const std::size_t pixels = windows.image().pixels();
   std::vector<float> image(pixels), truth(pixels);
   double sx = 0, sy = 0, sxx = 0, sxy = 0;
@@ -108,7 +110,7 @@ UpsampledFrame::UpsampledFrame(const WindowSet& windows, std::span<const std::ui
   std::vector<float> input(windows.input_size());
   for (const std::uint32_t i : chosen) {
     windows.window(i, input);
-    upsampling_(mean_of_channels(array_, std::span(input).last(array_.signals())), image);
+    upsampling_(mean_of_channels(array_, shown(input)), image);
     windows.truth(i, truth);
     for (std::size_t p = 0; p < pixels; ++p) {
       sx += image[p];
@@ -125,7 +127,7 @@ UpsampledFrame::UpsampledFrame(const WindowSet& windows, std::span<const std::ui
 
 void UpsampledFrame::predict(std::span<const float> input, std::span<float> out) const {
   check_input(input, array_);
-  upsampling_(mean_of_channels(array_, input.last(array_.signals())), out);
+  upsampling_(mean_of_channels(array_, shown(input)), out);
   for (float& v : out) v = static_cast<float>(slope_ * v + intercept_);
 }
 

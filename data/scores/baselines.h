@@ -52,9 +52,9 @@ class Bicubic {
   std::vector<float> down_, across_;  // [pixels][taxels]: weights of the taxels of a line on its pixels
 };
 
-/// Bicubic interpolation of the last frame (the mean of each taxel's channels), followed by a x + b: the line
-/// that fits the targets of the training examples best (least squares over all pixels). It turns voltage into
-/// height as well as two numbers can.
+/// Bicubic interpolation of the frame that a window shows (the mean of each taxel's channels), followed by a
+/// x + b: the line that fits the targets of the training examples best (least squares over all pixels). It
+/// turns voltage into height as well as two numbers can.
 class UpsampledFrame : public Baseline {
  public:
   /// Throws std::invalid_argument when train is empty.
@@ -65,7 +65,12 @@ class UpsampledFrame : public Baseline {
   double intercept() const { return intercept_; }
 
  private:
+  std::span<const float> shown(std::span<const float> input) const {
+    return input.last(array_.signals() * (1 + delay_frames_)).first(array_.signals());
+  }
+
   TaxelArray array_;
+  std::size_t delay_frames_;
   Bicubic upsampling_;
   double slope_ = 0, intercept_ = 0;
 };

@@ -185,7 +185,7 @@ void WindowSet::add(const Recording& recording, const std::string& folder, const
                                      .max_gap_s = settings_.max_gap_s,
                                      .frames_apart = settings_.timesteps == 1,
                                      .scaling = settings_.scaling});
-  delay_truth(track, delay());
+  delay_truth(track, delay_frames());
   Pass pass{.plate = recording.plate,
             .trial = recording.trial,
             .pass = recording.pass,
@@ -295,7 +295,7 @@ std::vector<float> WindowSet::window(std::size_t i) const {
 std::vector<float> WindowSet::shown_frame(std::size_t i) const {
   std::vector<float> values(array().signals());
   const Place place = place_of(i);
-  file_->read(stored_[place.pass].samples + (place.last - delay()) * array().signals(), values);
+  file_->read(stored_[place.pass].samples + (place.last - delay_frames()) * array().signals(), values);
   return values;
 }
 

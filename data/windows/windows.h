@@ -112,6 +112,10 @@ class WindowSet {
   SignalScale signal_scale() const { return settings_.signal_scale.value_or(SignalScale{}); }
   int scale() const { return settings_.scale; }
   std::size_t input_size() const { return frames() * array().signals(); }
+  /// Of delay_s.
+  std::size_t delay_frames() const {
+    return static_cast<std::size_t>(std::lround(settings_.delay_s * settings_.rate_hz));
+  }
   ImageGrid image() const { return array().picture(scale()); }
   const WindowSettings& settings() const { return settings_; }
   const WindowCounts& counts() const { return counts_; }
@@ -182,9 +186,6 @@ class WindowSet {
   void add_windows(const Track& track, std::size_t first, std::size_t end, std::uint32_t stride);
   void store(const Recording& recording, const Track& track, Stored& stored);
   Place place_of(std::size_t i) const;
-  std::size_t delay() const {
-    return static_cast<std::size_t>(std::lround(settings_.delay_s * settings_.rate_hz));
-  }
   std::array<float, 3> finger(const Place& place) const;
 
   WindowSettings settings_;

@@ -58,6 +58,10 @@ TEST(Windows, ShowWhereTheFingerWasTheirDelayAgo) {
     ASSERT_EQ(a, b) << i;
   }
   EXPECT_NE(later.fingerprint(), now.fingerprint());
+  const std::uint32_t shown[] = {10, 20}, shown_later[] = {10 + kFrames, 20 + kFrames};
+  UpsampledFrame(now, shown).predict(now.window(30), a);
+  UpsampledFrame(later, shown_later).predict(later.window(30 + kFrames), b);
+  EXPECT_EQ(a, b) << "bicubic interpolation of the frame that is shown";
 }
 
 TEST(Windows, NeverCrossTheEdgeOfAPass) {
