@@ -24,8 +24,8 @@
 #include "io/numbers/numbers.h"
 #include "io/numbers/parallel.h"
 #include "io/numbers/text.h"
-#include "models/files/classifier_file.h"
 #include "models/files/model_file.h"
+#include "models/networks/classifier.h"
 #include "models/training/loss/schedule.h"
 #include "models/training/recipe.h"
 #include "models/training/task.h"
@@ -39,9 +39,6 @@ void declare(Arguments& a) {
   a.option("seeds", "N", "runs: seeds 0 to N - 1 of classifier and order", "5");
   a.option("epochs", "N", "passes over the training windows", "8");
   a.option("stride", "N", "train on every N-th window in contact; tested are all", "1");
-  a.option("out", "FILE",
-           "keep the first run's classifier of super-resolved pictures, for supertac-stream --classifier")
-      .writes();
 }
 
 namespace {
@@ -68,7 +65,6 @@ struct ExperimentSettings {
   View view = View::frame;
   std::int64_t epochs = 8;
   std::uint64_t seed = 0;
-  OutputPath keep = "";  // file for the classifier of pictures; empty: none
 };
 
 constexpr std::size_t kBatch = 64;
@@ -208,12 +204,10 @@ std::vector<std::int32_t> answers(const Candidate& model, const WindowSet& windo
   };
   const Tensor sample = shown(std::span(data.train).first(1));
   const auto count = static_cast<Dim>(classes.size());
-  const ClassifierSettings network{
-      .height = sample.dim(1), .width = sample.dim(2), .channels = sample.dim(3), .classes = count};
   Rng rng(settings.seed);
-  const TextureClassifier classifier(network, rng);
+  const TextureClassifier classifier(
+      {.height = sample.dim(1), .width = sample.dim(2), .channels = sample.dim(3), .classes = count}, rng);
   train(classifier, model, windows, data, settings);
-  if (!settings.keep.path.empty()) save_classifier(settings.keep, classifier, network, classes);
   const NoGrad no_grad;
   const std::span<const std::uint32_t> test(data.test);
   std::vector<std::int32_t> result;
@@ -309,7 +303,6 @@ std::vector<Parts> experiment(const Arguments& a, const std::vector<View>& views
   Progress progress(a, "classifying", given.size(), "classifiers");
   parallel_for(given.size(), [&](std::size_t job) {
     ExperimentSettings s{.view = views[job % views.size()], .epochs = epochs, .seed = job / views.size()};
-    if (s.seed == 0 && s.view == View::super_resolved) s.keep = a.output("out");
     const std::size_t m = s.seed % models.size();
     given[job] = answers(models[m], windows, data[m], classes, s);
 #pragma omp critical

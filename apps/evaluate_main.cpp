@@ -4,7 +4,6 @@
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
-#include "apps/common/running/measure.h"
 #include "apps/common/running/progress.h"
 #include "apps/evaluate/exports.h"
 #include "apps/evaluate/map_scores.h"
@@ -14,6 +13,8 @@
 #include "data/recordings/recording.h"
 #include "data/windows/signal_remarks.h"
 #include "io/files/file.h"
+#include "io/numbers/clock.h"
+#include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
@@ -21,6 +22,25 @@ namespace supertac {
 namespace {
 
 constexpr int kSsimWindow = 7;  // pixels, of pictures below 11
+
+struct Latency {
+  double median_us = 0, p99_us = 0;
+  nlohmann::ordered_json to_json() const { return {{"median_us", median_us}, {"p99_us", p99_us}}; }
+};
+
+// Processor time of calls that make one picture each (batch 1, one thread), warm: what a clock on the wall
+// shows on an idle machine, without the turns that other programs take on a busy one.
+Latency measure_latency(const std::function<void()>& make_picture) {
+  constexpr int kWarmUp = 50, kPictures = 1000;
+  for (int n = 0; n < kWarmUp; ++n) make_picture();
+  std::vector<double> seconds(kPictures);
+  for (double& s : seconds) {
+    const double begin = seconds_of(CLOCK_THREAD_CPUTIME_ID);
+    make_picture();
+    s = seconds_of(CLOCK_THREAD_CPUTIME_ID) - begin;
+  }
+  return {.median_us = 1e6 * median(seconds), .p99_us = 1e6 * quantile(seconds, 0.99)};
+}
 
 // What is tested, and by which models, is noted for all that is written.
 WindowSet load_windows(const Arguments& a, const ModelFile& file) {
@@ -176,6 +196,7 @@ void declare(Arguments& a) {
            "window, pass, trial, texture, group or none (default: the model's own); its test side is scored");
   a.option("seed", "N", "of the split (default: the model's own)");
   a.option("limit", "N", "score at most N windows, evenly spread; 0 = all", "0");
+  a.option("history", "N", "score only windows with N frames of their pass behind them", "0");
   a.option("precision", "NAME", "fp32, or int8: the pictures of a microcontroller, slower", "fp32");
   a.option("contact", "VALUE",
            "of a measured truth: where a pixel shows more, from 0 to 1, something is in contact (default: "
@@ -214,7 +235,7 @@ int run(Arguments& a) {
   TestSet tested = test_set_of(a, files.front());
   const WindowSet windows = load_windows(a, files.front());
   tested.split = make_split(windows, split_kind(tested.split_name), tested.seed, tested.leave_out);
-  check_test_set(a, files, tested);
+  check_test_set(a, files, windows, tested);
   for (const std::string& one : remarks_on(windows, tested.split.test)) a.note("warning: " + one);
   if (windows.filter_s() && files.front().input.filter_left(*windows.filter_s()) != 0)
     a.note("warning: the recordings' signals have gone through a moving average of " +

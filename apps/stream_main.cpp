@@ -93,8 +93,6 @@ void declare(Arguments& a) {
       .option("plate", "NAME", "what the recording slides over: a plate's name, or an STL file", "unknown")
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
       .writes()
-      .option("classifier", "FILE",
-              "name the texture on the page, with a classifier by supertac-classify --out")
       .option("precision", "NAME",
               "fp32, or int8: the pictures of a microcontroller (supertac-export --c99), slower", "fp32")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
@@ -185,7 +183,6 @@ int run(Arguments& a) {
   const double begin = monotonic_seconds();
   const double speedup = a.number("speedup", 0.1, 100);
   StreamSettings settings{.out = probed ? "" : a.output("out"),
-                          .classifier = a.text("classifier"),
                           .mcap = a.output("mcap"),
                           .record = a.text("record"),
                           .plate = a.text("plate"),
@@ -199,8 +196,6 @@ int run(Arguments& a) {
   settings.web = web_address(a);
   settings.badge = badge_of(a), settings.source = origin;
   const bool drawn = a.given("model");
-  if (!drawn && a.given("classifier"))
-    throw UsageError("--classifier: only with --model, whose pictures it names");
   settings.metadata = {{"kind", "pictures"}, {"model", a.text("model")}, {"source", origin}};
   std::vector<ModelFile> models;
   if (drawn) models = load_models(a.list("model"));

@@ -16,7 +16,6 @@ void declare(Arguments& a) {
   a.option("resume", "FILE", "continue from the last.safetensors of an interrupted run, same options");
   a.option("seed", "N", "of split, initial weights, order, noise", "0");
   declare_training(a);
-  declare_network(a);
 }
 
 namespace {

@@ -1,7 +1,7 @@
 # Man pages, completion, the bill of materials, and cpack -G DEB.
 get_property(jobs GLOBAL PROPERTY SUPERTAC_PROGRAM_TARGETS)
 set(share ${CMAKE_CURRENT_BINARY_DIR}/share)
-foreach(program supertac ${jobs})
+foreach(program supertac supertac-sweep ${jobs})
   install(FILES ${CMAKE_CURRENT_SOURCE_DIR}/packaging/completion.bash RENAME ${program}
     DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT programs)
 endforeach()
@@ -9,7 +9,7 @@ install(FILES docs/glossary.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT pro
 
 find_program(SUPERTAC_HELP2MAN help2man)
 if(SUPERTAC_HELP2MAN)
-  foreach(program supertac ${jobs})
+  foreach(program ${jobs})
     set(page ${share}/man/${program}.1)
     add_custom_command(OUTPUT ${page}.gz DEPENDS ${program}
       COMMAND ${CMAKE_COMMAND} -E make_directory ${share}/man

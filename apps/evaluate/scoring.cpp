@@ -53,7 +53,8 @@ TestSet test_set_of(const Arguments& a, const ModelFile& file) {
           {}};
 }
 
-void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, TestSet& tested) {
+void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, const WindowSet& windows,
+                    TestSet& tested) {
   // Who asks for every window knows what the models have seen.
   if (!a.given("split") || tested.split_name != "none") refuse_leak(files, tested.split_name);
   if (!a.given("split") && tested.split_name == "none")
@@ -72,8 +73,13 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, Tes
         "and --seed those that it has not seen are tested");
   if (!a.given("split") && files.front().metadata.contains("interval_factor_found"))
     a.note("the factor of the intervals was found on these groups: that they hold here is no measurement");
-  const auto limit =
-      static_cast<std::size_t>(a.integer("limit", 0, std::numeric_limits<std::uint32_t>::max()));
+  constexpr auto kMost = std::numeric_limits<std::uint32_t>::max();
+  const auto history = static_cast<std::size_t>(a.integer("history", 0, kMost));
+  std::erase_if(tested.split.test, [&](std::uint32_t i) { return windows.history(i) < history; });
+  if (tested.split.test.empty())
+    throw UsageError("--history " + a.text("history") +
+                     " leaves none of the test windows; give a smaller number");
+  const auto limit = static_cast<std::size_t>(a.integer("limit", 0, kMost));
   if (limit > 0) tested.split.test = evenly_spaced(tested.split.test, limit);
   if (tested.split.train.empty())
     throw std::runtime_error(

@@ -29,9 +29,7 @@ struct LiveState {
   std::vector<float> picture;      ///< [rows * scale][columns * scale]; empty before the first
   std::vector<float> half_widths;  ///< the same, as LiveFrame
   std::optional<double> distance;
-  bool unlike_training = false;  ///< the signals are not such as the model has learnt from
-  std::string texture;           ///< that the picture shows, by a classifier; empty: none, or no texture
-  double texture_probability = 0;
+  bool unlike_training = false;     ///< the signals are not such as the model has learnt from
   float x_mm = NAN, y_mm = NAN;     ///< of the finger's centre on the plate, where known
   MapCells map;                     ///< what has changed of the surface that was felt; empty: nothing
   std::optional<NamedMap> surface;  ///< all of it, once a second

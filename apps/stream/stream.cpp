@@ -19,15 +19,10 @@
 namespace supertac {
 namespace {
 
-constexpr double kMostLateS = 0.02, kWaitS = 0.05, kFiguresEveryS = 0.5, kShowEveryS = 1.0 / 60,
-                 kNameEveryS = 0.1;
+constexpr double kMostLateS = 0.02, kWaitS = 0.05, kFiguresEveryS = 0.5, kShowEveryS = 1.0 / 60;
 
 double wall_clock_seconds() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
-bool has_texture(std::span<const float> picture) {
-  return std::ranges::any_of(picture, [](float v) { return v > 0.2F; });
 }
 
 }  // namespace
@@ -61,22 +56,13 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   if (maker_ && (settings.web || !settings.map.path.empty()))
     map_.emplace(maker_->image(), models.front().model->settings().timesteps > 1);
   about_lines_ = about_lines(source.array(), source.signal_scale().unit, format.image);
-  if (!settings.classifier.empty()) {
-    classifier_ = load_classifier(settings.classifier);
-    const ImageGrid image = maker_->image();
-    if (classifier_->settings.height != image.height || classifier_->settings.width != image.width)
-      throw std::runtime_error(settings.classifier + ": names pictures of " +
-                               std::to_string(classifier_->settings.height) + "x" +
-                               std::to_string(classifier_->settings.width) + " pixels, the model's have " +
-                               image.text() + "; give a classifier that was trained with this model");
-  }
   if (!settings.web) return;
   recorder_ = std::make_unique<Recorder>(signals, recording_);
   web_ = std::make_unique<WebView>(
       *settings.web,
       WebSource{settings.badge, settings.source, source.array(), state_.scale, format.half_widths,
-                classifier_.has_value(), state_.unit, state_.draws, maker_ ? maker_->delay_s() : 0,
-                source.silent(), settings.found, [this](MapCells cells) { return named(std::move(cells)); }},
+                state_.unit, state_.draws, maker_ ? maker_->delay_s() : 0, source.silent(), settings.found,
+                [this](MapCells cells) { return named(std::move(cells)); }},
       *recorder_);
 }
 
@@ -311,13 +297,6 @@ double Stream::keep_pace(double time_s) const {
   return monotonic_seconds();
 }
 
-void Stream::name_texture() {
-  state_.texture.clear();
-  if (!has_texture(state_.picture)) return;
-  const NamedClassifier::Answer answer = classifier_->name_of(state_.picture);
-  state_.texture = answer.name, state_.texture_probability = answer.probability;
-}
-
 void Stream::show() {
   const double now = monotonic_seconds();
   if ((!view_ && !web_) || now - shown_s_ < kShowEveryS) return;
@@ -335,7 +314,6 @@ void Stream::show() {
   }
   if (frames_ > 0)
     state_.taxels = raw_.taxels(), state_.top = raw_.top(), state_.most_changed = raw_.most_changed();
-  if (classifier_ && now - named_s_ >= kNameEveryS) named_s_ = now, name_texture();
   if (view_) view_->update(state_);
   if (web_ && web_->update(state_, map_ ? &*map_ : nullptr, changed_)) changed_ = {};
 }

@@ -19,7 +19,6 @@
 #include "data/map/elements.h"
 #include "data/map/map_file.h"
 #include "data/recordings/mcap_log.h"
-#include "models/files/classifier_file.h"
 
 namespace supertac {
 
@@ -27,7 +26,6 @@ struct StreamSettings {
   double seconds = std::numeric_limits<double>::infinity();  ///< of signal, after which run() ends
   OutputPath out = "";  ///< file that keeps the pictures; "-": a line for each to stdout; empty: none
   Precision precision = Precision::fp32;
-  std::string classifier = {};       ///< file that names the texture; empty: none
   OutputPath mcap = "";              ///< MCAP file that keeps frames and pictures; empty: none
   std::string record = {};           ///< folder that gets a recording; empty: none
   std::string plate = "unknown";     ///< of the recording: a plate's name or an STL file
@@ -47,8 +45,7 @@ struct StreamSettings {
 class Stream {
  public:
   /// `models`, of which there may be none, and `source` must outlive this. Throws as PictureMaker,
-  /// PictureLog, load_classifier() and WebServer; std::runtime_error for a classifier of other pictures than
-  /// the models'.
+  /// PictureLog and WebServer.
   Stream(const StreamSettings& settings, std::span<const ModelFile> models, SensorSource& source);
 
   /// Until the source ends, `seconds` are over, or a signal comes. What is recorded passes as fast as it
@@ -82,7 +79,6 @@ class Stream {
   void complete();
   void describe_recording();
   void show();
-  void name_texture();
   double milliseconds(double quantile) const { return 1e3 * latency_.quantile(quantile); }
   std::uint64_t dropped() const { return too_late_ + source_.counters().dropped; }
 
@@ -99,7 +95,6 @@ class Stream {
   std::unique_ptr<PipeOutput> pipe_;
   std::unique_ptr<Recorder> recorder_;  // at the page's wish
   std::unique_ptr<WebView> web_;
-  std::optional<NamedClassifier> classifier_;
   struct Place {
     double time_s;
     float x_mm, y_mm, lift_mm;
@@ -112,7 +107,7 @@ class Stream {
   std::uint64_t frames_ = 0, too_late_ = 0, unlike_ = 0, lines_lost_ = 0, figures_frames_ = 0;
   double first_s_ = 0, last_s_ = 0;  // the sensor's time
   double wall_offset_s_ = 0;         // from the sensor's time to the wall clock's
-  double begin_s_ = 0, figures_s_ = 0, shown_s_ = 0, named_s_ = 0;
+  double begin_s_ = 0, figures_s_ = 0, shown_s_ = 0;
 };
 
 }  // namespace supertac

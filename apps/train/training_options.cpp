@@ -11,7 +11,7 @@
 
 namespace supertac {
 
-void declare_training(Arguments& a) {
+static void declare_steps(Arguments& a) {
   a.option("split", "NAME", "what is kept for testing: window, pass, trial, texture, group or none", "trial");
   a.option("epochs", "N", "passes over the training windows (default: the preset's 20; tiny: 80)");
   a.more();
@@ -34,7 +34,7 @@ void declare_training(Arguments& a) {
   a.more(false);
 }
 
-void declare_window_training(Arguments& a) {
+static void declare_windows(Arguments& a) {
   a.option("plates", "A,B,...", "only recordings of these plates (default: all)");
   a.option("stride", "N", "take every N-th window of a pass", "1");
   a.option(
@@ -45,7 +45,7 @@ void declare_window_training(Arguments& a) {
   a.option(
       "leave-out", "A,B,...",
       "with --split texture the plates, with --split group the groups that are tested (default: drawn with "
-      "the seed); of supertac-sweep also each: all in turn, a row for each");
+      "the seed)");
   a.more();
   a.option(
       "rate", "HZ",
@@ -64,13 +64,10 @@ void declare_window_training(Arguments& a) {
       "of the signals: per-window (each window to its own rest and gain, so that a finger pressed harder "
       "is seen like any other) or fixed",
       "per-window");
-  a.option(
-      "augment", "NAME",
-      "standard: random gains, offsets, noise, dropped taxels and a finger lifted a little, for unseen "
-      "trials, and signals in which nothing is felt; mirror: none of these, but windows and truths turned "
-      "round, left to right and top to bottom, for arrays that feel alike everywhere; none, as in preset "
-      "frame",
-      "standard");
+  a.option("augment", "NAME",
+           "standard: random gains, offsets, noise, dropped taxels and a finger lifted a little, for unseen "
+           "trials, and signals in which nothing is felt; none, as in preset frame",
+           "standard");
   a.option(
       "interval-factor", "X,Y",
       "half the width of a pixel's 90 % interval: X times the largest difference from a pixel around it, "
@@ -85,7 +82,8 @@ void declare_window_training(Arguments& a) {
   a.more(false);
 }
 
-void declare_network(Arguments& a) {
+void declare_training(Arguments& a) {
+  declare_steps(a);
   a.option(
       "preset", "NAME",
       "recipe to begin with: paper (as in the paper), tiny (a ninth of the multiply-adds, a third of the "
@@ -99,7 +97,7 @@ void declare_network(Arguments& a) {
   a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512, or 1 (default: the preset's)");
   a.option("scale", "N", "pictures N times as fine as the array, which the recordings name: 2, 4, 8 or 16",
            "4");
-  declare_window_training(a);
+  declare_windows(a);
   a.more().option("latent", "LD", "latent numbers per group of taxels", "10");
 }
 
@@ -118,7 +116,19 @@ static std::optional<Scaling> stated_range(const Arguments& a) {
   return Scaling{.rest = *rest, .span = *span};
 }
 
-Recipe recipe_of(const Arguments& a, Recipe r) {
+Recipe recipe_of(const Arguments& a) {
+  if (a.given("like") && a.given("preset"))
+    throw UsageError("expected --preset NAME or --like MODEL, found both");
+  Recipe r;
+  if (a.given("like")) {
+    r = Recipe::of(load_model(a.text("like")), a.text("like"));
+  } else {
+    r = Recipe::named(a.choice("preset", {"paper", "tiny", "frame"}));
+  }
+  if (a.given("timesteps")) r.model.timesteps = a.integer("timesteps", 1, 512);
+  if (a.given("latent")) r.model.latent = a.integer("latent", 1, 256);
+  if (a.given("scale")) r.model.scale = std::stoi(a.choice("scale", {"2", "4", "8", "16"}));
+  if (a.given("seed")) r.seed = a.seed();
   if (a.given("epochs")) r.epochs = a.integer("epochs", 1, 100'000);
   if (a.given("learning-rate")) r.learning_rate = a.number("learning-rate", 1e-9, 1);
   if (a.given("batch")) r.batch = a.integer("batch", 1, 4096);
@@ -133,11 +143,9 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
   if (a.given("delay")) r.delay_s = a.number("delay", 0, 10);
   if (a.given("range")) r.range = stated_range(a);
   if (a.given("scaling")) r.per_window = a.choice("scaling", {"per-window", "fixed"}) == "per-window";
-  if (a.given("augment")) {
-    const std::string name = a.choice("augment", {"standard", "mirror", "none"});
-    r.augment = name == "standard" ? kStandardAugmentation : AugmentSettings{};
-    r.mirror = name == "mirror";
-  }
+  if (a.given("augment"))
+    r.augment =
+        a.choice("augment", {"standard", "none"}) == "standard" ? kStandardAugmentation : AugmentSettings{};
   if (a.given("interval-factor")) {
     r.interval_factor = PixelInterval::read(a.text("interval-factor"));
     if (!r.interval_factor)
@@ -148,22 +156,6 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
   if (a.given("beta")) r.loss.beta = a.number("beta", 0, 1e6);
   as_usage([&] { r.check(); });
   return r;
-}
-
-Recipe recipe_of(const Arguments& a) {
-  if (a.given("like") && a.given("preset"))
-    throw UsageError("expected --preset NAME or --like MODEL, found both");
-  Recipe r;
-  if (a.given("like")) {
-    r = Recipe::of(load_model(a.text("like")), a.text("like"));
-  } else {
-    r = Recipe::named(a.choice("preset", {"paper", "tiny", "frame"}));
-  }
-  if (a.given("timesteps")) r.model.timesteps = a.integer("timesteps", 1, 512);
-  if (a.given("latent")) r.model.latent = a.integer("latent", 1, 256);
-  if (a.given("scale")) r.model.scale = std::stoi(a.choice("scale", {"2", "4", "8", "16"}));
-  if (a.given("seed")) r.seed = a.seed();
-  return recipe_of(a, r);
 }
 
 RecordingFolders folders_of(const Arguments& a) {

@@ -1,4 +1,4 @@
-// The options of programs that train: what they change in a recipe (models/training/recipe.h).
+// The options of supertac-train: what they change in a recipe (models/training/recipe.h).
 #pragma once
 
 #include "apps/common/command_line/arguments.h"
@@ -6,16 +6,8 @@
 
 namespace supertac {
 
-/// Split, steps and loss: what every training has.
+/// Split, steps, network, windows, augmentation and loss: all but the recordings and the seed.
 void declare_training(Arguments& a);
-/// Recordings, windows, augmentation and the loss of SuperTac: everything else but the network and the seed.
-void declare_window_training(Arguments& a);
-/// --preset and --like, the network of one training, and declare_window_training().
-void declare_network(Arguments& a);
-
-/// `base` with what the options of declare_training() and declare_window_training() change. Throws
-/// UsageError.
-Recipe recipe_of(const Arguments& a, Recipe base);
 /// The recipe of --preset or of the model --like, with all options over it, --seed included. Throws
 /// UsageError, and as load_model() and Recipe::of().
 Recipe recipe_of(const Arguments& a);

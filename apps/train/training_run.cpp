@@ -73,7 +73,7 @@ bool TrainingRun::train() {
           (target_.resume.empty() ? "" : ", resumed at " + std::to_string(trainer_.step())));
   for (const std::string& note : task_.notes) a_.note(note);
   {
-    Progress progress(a_, target_.label, static_cast<std::uint64_t>(trainer_.total_steps()), "steps",
+    Progress progress(a_, "training", static_cast<std::uint64_t>(trainer_.total_steps()), "steps",
                       static_cast<std::uint64_t>(trainer_.step()));
     supertac::train(trainer_, task_, callbacks(progress));
   }

@@ -1,4 +1,4 @@
-// One model trained into a file: what supertac-train does once, and supertac-sweep for each model of a grid.
+// One model trained into a file.
 #pragma once
 
 #include <optional>
@@ -13,11 +13,10 @@
 namespace supertac {
 
 struct TrainingTarget {
-  OutputPath out;                  ///< the model file; its run folder lies beside it
-  bool force = false;              ///< whether an earlier run's folder may be overwritten
-  std::string resume;              ///< the checkpoint to continue from; "" = start anew
-  std::string label = "training";  ///< of the progress bar
-  Ranks& ranks = one_process();    ///< that train together; only the first writes
+  OutputPath out;                ///< the model file; its run folder lies beside it
+  bool force = false;            ///< whether an earlier run's folder may be overwritten
+  std::string resume;            ///< the checkpoint to continue from; "" = start anew
+  Ranks& ranks = one_process();  ///< that train together; only the first writes
 };
 
 class TrainingRun {
@@ -35,7 +34,6 @@ class TrainingRun {
   const std::string& out() const { return target_.out.path; }
   /// Of the first rank only.
   const RunFolder& folder() const { return *folder_; }
-  const TrainingTask& task() const { return task_; }
   /// What settings.json holds: command, version, commit, settings, data, split.
   const nlohmann::ordered_json& description() const { return description_; }
 

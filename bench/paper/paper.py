@@ -78,7 +78,7 @@ class Study:
 
     def models(self, split):
         """The models of 16x16 pictures, by seed."""
-        return [self.out / f"pixels_{split}" / "models" / f"paper_t256_l10_x4_c32_r3_s{seed}.safetensors" for seed in self.seeds]
+        return [self.out / f"pixels_{split}" / "models" / f"paper_x4_s{seed}.safetensors" for seed in self.seeds]
 
     def pictures(self, split):
         """The folder of pictures that the first seed's network draws of its test windows."""

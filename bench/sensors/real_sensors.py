@@ -99,9 +99,6 @@ class Study:
         yield "back-projection", scores(name, baselines.back_projection(frames[1], scale), passes[1])
         yield "A+", scores(name, baselines.APlus(frames[0], truths[0], scale, seed=seed)(frames[1]), passes[1])
         yield "one frame", self.network(name, seed, "frame", passes, 1, "--preset", "frame")
-        if name == "mat":  # whoever lies on it may lie the other way round
-            yield "one frame, mirrored", self.network(name, seed, "mirrored", passes, 1, "--preset", "frame", "--augment",
-                                                      "mirror")
 
     def windows(self, name, seed):
         read, _, in_time = sets.SETS[name]

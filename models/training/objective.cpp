@@ -9,9 +9,6 @@ namespace {
 const Recipe& checked(const Recipe& recipe, const TaxelArray& array) {
   recipe.check();
   check(recipe.augment, array);
-  if (recipe.mirror && array.channels != 1)  // an axis of a field would have to change its sign
-    throw std::invalid_argument("recipe: mirror is for arrays of one number a taxel, found " +
-                                std::to_string(array.channels));
   return recipe;
 }
 
@@ -47,15 +44,6 @@ PerGroup<Tensor> Objective::eps_of(const Batch& batch) const {
 
 void Objective::augment(std::uint64_t sample, std::span<float> window) const {
   if (recipe_.augment.any()) supertac::augment(recipe_.augment, recipe_.seed, sample, window, array_);
-}
-
-void Objective::mirror(std::uint64_t sample, std::span<float> window, std::span<float> truth) const {
-  if (!recipe_.mirror) return;
-  const auto rows = static_cast<std::size_t>(array_.rows), columns = static_cast<std::size_t>(array_.columns);
-  const auto scale = static_cast<std::size_t>(recipe_.model.scale);
-  const Mirroring mirroring = Mirroring::drawn(recipe_.seed, sample);
-  supertac::mirror(mirroring, window, rows, columns);
-  supertac::mirror(mirroring, truth, rows * scale, columns * scale);
 }
 
 }  // namespace supertac

@@ -42,8 +42,6 @@ class Objective {
   Dim latents() const { return recipe_.model.latents(); }
   /// Augments a window in place; `sample` is its number since training began.
   void augment(std::uint64_t sample, std::span<float> window) const;
-  /// Turns a window and its truth round, where the recipe says so.
-  void mirror(std::uint64_t sample, std::span<float> window, std::span<float> truth) const;
 
   /// Its settings as JSON text, to compare on resume.
   std::string text() const { return training_text(recipe_); }

@@ -31,7 +31,8 @@ void read_training(JsonObject entry, Recipe& r) {
                .offset = entry.number("offset"),
                .noise = entry.number("noise"),
                .dropped = entry.integer("dropped")};
-  r.mirror = entry.flag("mirror", false);
+  if (entry.flag("mirror", false))
+    throw FileError(entry.where(), "trained with --augment mirror, which is gone: draw with it, train anew");
   r.keeps_best = entry.flag("keeps_best", false);
   r.sampling = entry.flag("sampling", true);
 }
@@ -100,7 +101,6 @@ std::string training_text(const Recipe& r) {
                {"offset", r.augment.offset},
                {"noise", r.augment.noise},
                {"dropped", r.augment.dropped}});
-  if (r.mirror) json["mirror"] = true;
   if (r.keeps_best) json["keeps_best"] = true;
   if (!r.sampling) json["sampling"] = false;
   return json.dump();

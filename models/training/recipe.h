@@ -33,9 +33,6 @@ struct Recipe {
   bool sampling = true;
   /// Of the windows. With any of it, passes in which nothing is felt are added (add_silent_passes).
   AugmentSettings augment;
-  /// Whether windows and truths are turned round at random, left to right and top to bottom: for arrays that
-  /// feel alike everywhere, of one number a taxel.
-  bool mirror = false;
 
   std::vector<std::string> plates;     ///< only recordings of these; none: of all
   SplitKind split = SplitKind::trial;  ///< what is kept for testing

@@ -60,7 +60,7 @@ Trainer::MicroBatch::MicroBatch(const Objective& master, Dim first_sample, Dim c
 }
 
 // The windows [n,T,signals] and truths [n,H,W,1] of this step, n the samples of a micro-batch, each augmented
-// and mirrored by the number of its sample.
+// by the number of its sample.
 void Trainer::fill(MicroBatch& micro_batch) const {
   const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
   const std::uint64_t epoch = static_cast<std::uint64_t>(step()) / per_epoch;
@@ -76,9 +76,7 @@ void Trainer::fill(MicroBatch& micro_batch) const {
     const std::span<float> target =  // [H,W,1]
         micro_batch.batch.targets.values().subspan(n * target_size, target_size);
     windows_.truth(indices_[slot], target);
-    const std::uint64_t sample = batching_.sample(epoch, b, slot);
-    if (windows_.augmentable(indices_[slot])) objective_.augment(sample, input);
-    objective_.mirror(sample, input, target);
+    if (windows_.augmentable(indices_[slot])) objective_.augment(batching_.sample(epoch, b, slot), input);
   }
 }
 

@@ -108,11 +108,6 @@ Arguments& Arguments::flag(const std::string& name, const std::string& help) {
   return *this;
 }
 
-Arguments& Arguments::one_of(std::vector<std::string> names) {
-  one_of_.push_back(std::move(names));
-  return *this;
-}
-
 Arguments& Arguments::only_with(const std::string& option) {
   only_with_ = option;
   return *this;
@@ -272,17 +267,6 @@ std::string Arguments::deciding_options() const {
 }
 
 void Arguments::check_together() const {
-  for (const std::vector<std::string>& names : one_of_) {
-    const auto count = std::ranges::count_if(names, [this](const std::string& name) { return given(name); });
-    if (count == 1) continue;
-    std::string expected;
-    for (const std::string& name : names)
-      expected += (expected.empty()       ? "--"
-                   : name == names.back() ? " or --"
-                                          : ", --") +
-                  name + " " + options_.at(name).value;
-    throw UsageError("expected " + expected + ", found " + (count == 0 ? "none" : std::to_string(count)));
-  }
   for (const std::string& name : order_) {
     const std::string& needed = options_.at(name).only_with;
     if (needed.empty() || !given(name) || given(needed)) continue;

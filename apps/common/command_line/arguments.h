@@ -59,8 +59,6 @@ class Arguments {
   Arguments& option_alone(const std::string& name, const std::string& value, const std::string& help,
                           const std::string& alone);
   Arguments& flag(const std::string& name, const std::string& help);
-  /// Exactly one of these options has to be given.
-  Arguments& one_of(std::vector<std::string> names);
   /// The options declared from here on say something beside `option` only and are refused without it; "" ends
   /// this.
   Arguments& only_with(const std::string& option);
@@ -149,7 +147,6 @@ class Arguments {
   std::vector<std::string> order_;        // of declaration
   std::vector<std::string> positionals_;  // value names
   std::map<std::string, Option> options_;
-  std::vector<std::vector<std::string>> one_of_;
   std::string only_with_;  // of the options being declared
   bool more_ = false, muted_ = false;
   mutable bool displaced_ = false;

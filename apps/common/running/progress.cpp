@@ -35,16 +35,9 @@ std::size_t terminal_width() {
   return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col : 80;
 }
 
-std::string about(double seconds) {
-  if (seconds < 90) return std::to_string(5 * std::lround(seconds / 5)) + " seconds";
-  if (seconds < 90 * 60) return std::to_string(std::lround(seconds / 60)) + " minutes";
-  return format(seconds / 3600, 1) + " hours";
-}
-
 Progress::Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit,
                    std::uint64_t before)
-    : arguments_(arguments),
-      what_(std::move(what)),
+    : what_(std::move(what)),
       unit_(std::move(unit)),
       total_(total),
       before_(before),
@@ -59,26 +52,13 @@ Progress::~Progress() {
 void Progress::update(std::uint64_t done, const std::string& detail, double seconds_left) {
   using namespace std::chrono_literals;
   const auto now = std::chrono::steady_clock::now();
-  if (now - begin_ < 2s || now - last_ < 200ms || (done <= before_ && seconds_left <= 0)) return;
+  if (!drawable_ || now - begin_ < 2s || now - last_ < 200ms || (done <= before_ && seconds_left <= 0))
+    return;
   last_ = now;
   const double seconds = std::chrono::duration<double>(now - begin_).count();
   const double rate = seconds_left > 0 ? static_cast<double>(total_ - done) / seconds_left
                                        : static_cast<double>(done - before_) / seconds;
-  if (!said_ && now - begin_ >= 3s) {
-    const double part = static_cast<double>(total_ - before_) / rate;
-    said_ = say_how_long(seconds_left > 0 ? seconds_left : part - seconds);
-  }
-  if (drawable_)
-    draw(progress_line(what_, done, total_, unit_, rate, detail).substr(0, terminal_width() - 1));
-}
-
-// Where the first parts are the short ones, the work turns out to be long only later.
-bool Progress::say_how_long(double seconds_left) {
-  constexpr double kShort = 5;
-  if (seconds_left < kShort) return false;
-  if (width_ > 0) draw("");
-  arguments_.note(what_ + ": about " + about(seconds_left) + " to go");
-  return true;
+  draw(progress_line(what_, done, total_, unit_, rate, detail).substr(0, terminal_width() - 1));
 }
 
 void Progress::draw(const std::string& line) {

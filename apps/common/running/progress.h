@@ -15,10 +15,9 @@ bool drawable_terminal();
 /// Its columns; 80 where it does not say.
 std::size_t terminal_width();
 
-/// How far a long work is, on stderr and not under --quiet. After its first seconds a line says how long the
-/// whole of it takes, where that is long. On a terminal (not TERM=dumb) a bar shows share done, rate and time
-/// left, once the work has taken two seconds; it needs no colour and no escape codes. Not to be shared by
-/// threads.
+/// How far a long work is: on a terminal (not TERM=dumb), and not under --quiet, a bar on stderr shows share
+/// done, rate and time left, once the work has taken two seconds; it needs no colour and no escape codes. Not
+/// to be shared by threads.
 class Progress {
  public:
   /// `unit`: what is counted, in the plural ("passes", "steps"). `before`: how many of `total` were done
@@ -35,13 +34,11 @@ class Progress {
   void update(std::uint64_t done, const std::string& detail = "", double seconds_left = 0);
 
  private:
-  bool say_how_long(double seconds_left);
   void draw(const std::string& line);
 
-  const Arguments& arguments_;
   std::string what_, unit_;
   std::uint64_t total_, before_;
-  bool drawable_, said_ = false;
+  bool drawable_;
   std::size_t width_ = 0;  // of what is drawn
   std::chrono::steady_clock::time_point begin_, last_;
 };
@@ -56,8 +53,5 @@ std::function<void(std::size_t done, std::size_t all)> progress_of(const Argumen
 /// `detail` replaces it.
 std::string progress_line(const std::string& what, std::uint64_t done, std::uint64_t total,
                           const std::string& unit, double rate, const std::string& detail = "");
-
-/// About how long that is, in words: "40 seconds", "12 minutes", "2.5 hours".
-std::string about(double seconds);
 
 }  // namespace supertac

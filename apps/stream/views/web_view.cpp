@@ -51,7 +51,6 @@ std::string WebView::hello() {
                  {"pitch_mm", {source_.array.pitch_mm.x, source_.array.pitch_mm.y}},
                  {"scale", source_.scale},
                  {"predicts_error", source_.predicts_error},
-                 {"names_textures", source_.names_textures},
                  {"unit", source_.unit},
                  {"draws", source_.draws},
                  {"delay_s", source_.delay_s},
@@ -93,8 +92,6 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
   if (!state.picture.empty()) event["picture"] = levels_base64(state.picture);
   if (!state.half_widths.empty()) event["wide"] = levels_base64(state.half_widths);
   if (state.distance) event["distance"] = *state.distance, event["unlike"] = state.unlike_training;
-  if (!state.texture.empty())
-    event["texture"] = state.texture, event["probability"] = state.texture_probability;
   if (std::isfinite(state.x_mm)) event["x"] = state.x_mm, event["y"] = state.y_mm;
   if (const MapRegion& r = state.map.region; !r.empty()) {
     std::vector<std::uint8_t> felt;

@@ -19,7 +19,7 @@ struct WebSource {
   std::string source;  ///< which
   TaxelArray array;
   int scale = 4;
-  bool predicts_error = false, names_textures = false;
+  bool predicts_error = false;
   std::string unit = {};                           ///< of the signals
   bool draws = false;                              ///< there is a model
   double delay_s = 0;                              ///< of its pictures

@@ -51,7 +51,6 @@ function onHello(hello) {
   element("drawn-size").textContent =
     `${hello.rows * hello.scale} × ${hello.columns * hello.scale} pixels of ${sizeText(hello.pixel_mm)} mm` +
     (hello.delay_s > 0 ? `, as it was ${hello.delay_s} s ago` : "");
-  for (const id of ["texture-name", "texture"]) element(id).hidden = !hello.names_textures;
   element("guess-line").hidden = !hello.predicts_error;
   element("sure").hidden = !hello.predicts_error;
   element("drawn").closest("figure").hidden = !hello.draws;
@@ -141,7 +140,6 @@ function mostText({taxel, channel, rest, now}) {
 
 function showFigures(event) {
   const set = (id, text) => { if (element(id).textContent !== text) element(id).textContent = text; };
-  set("texture", event.texture ? `${event.texture}, ${(100 * event.probability).toFixed(0)} %` : "none");
   set("rate", event.rate.toFixed(0) + " /s");
   set("p50", event.p50.toFixed(2) + " ms");
   set("p99", event.p99.toFixed(2) + " ms");

@@ -118,12 +118,6 @@ TEST(Progress, LineTellsShareRateAndTimeLeft) {
             "x  [##........]  25 %  epoch 1/4  0:30 left");
 }
 
-TEST(Progress, SaysAboutHowLong) {
-  EXPECT_EQ(about(38), "40 seconds");
-  EXPECT_EQ(about(700), "12 minutes");
-  EXPECT_EQ(about(9000), "2.5 hours");
-}
-
 // Not to be replaced; what was said of a name that was taken goes to `said`.
 OutputPath new_at(const std::string& path, std::string& said) {
   return {path, [&said](const std::string& line) { said = line; }};

@@ -64,7 +64,7 @@ TEST_F(Export, SaysWhatItCannotExport) {
                  "give a file that supertac-train wrote");
   EXPECT_FALSE(std::filesystem::exists(path("m.onnx")));
   expect_failure(run("supertac-export " + recording), 2,
-                 "expected --onnx FILE, --c99 DIR or --mcap FILE, found none");
+                 "expected one of --onnx FILE and --c99 DIR, found none");
 }
 
 TEST_F(Simulate, SameSeedSameBytesForAnyThreads) {
@@ -213,8 +213,7 @@ TEST_F(Info, SendsNoControlCodesToTheTerminal) {
 
 TEST_F(Dispatcher, RunsTheProgramsNextToIt) {
   EXPECT_EQ(run("supertac").code, 2);
-  expect_failure(run("supertac simulat"), 2,
-                 "unknown job 'simulat'; did you mean 'simulate'? (supertac --help lists them)");
+  expect_failure(run("supertac simulat"), 2, "unknown job simulat (supertac --help lists them)");
   EXPECT_TRUE(contains(run("supertac info --version").out, "supertac-info "));
   expect_failure(run("supertac info"), 2, "missing FILE");
 }
@@ -222,7 +221,7 @@ TEST_F(Dispatcher, RunsTheProgramsNextToIt) {
 TEST_F(Dispatcher, HelpIsThatOfTheJobOrTheGlossary) {
   EXPECT_EQ(run("supertac help info").out, run("supertac-info --help").out);
   EXPECT_EQ(run("supertac help").out, run("supertac --help").out);
-  expect_failure(run("supertac help inf"), 2, "did you mean 'info'?");
+  expect_failure(run("supertac help inf"), 2, "unknown job inf");
   const std::string glossary = run("supertac help glossary").out;
   for (const char* term : {"taxel", "window", "pass", "trial", "split", "normalised per window", "latent",
                            "contact", "SSIM", "ghost rate"})

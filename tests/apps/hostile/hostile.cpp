@@ -38,8 +38,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kPrograms[] = {"check", "classify", "collect", "evaluate", "export", "import", "info",
-                                     "plate", "simulate", "stream",  "sweep",    "train",  "rig"};
+constexpr const char* kPrograms[] = {"check", "classify", "collect",  "evaluate", "export", "import",
+                                     "info",  "plate",    "simulate", "stream",   "train",  "rig"};
 // A command that works, on which evil is heaped; a later option replaces an earlier one.
 const std::map<std::string, std::vector<std::string>> kGood = {
     {"check", {"file", "model", "data"}},
@@ -53,7 +53,6 @@ const std::map<std::string, std::vector<std::string>> kGood = {
     {"plate", {"--plate", "plain", "--out", "new.stl"}},
     {"simulate", {"--out", "new", "--plates", "plain", "--passes", "1", "--trials", "1", "--speeds", "50"}},
     {"stream", {"--model", "model", "--recording", "data/good"}},
-    {"sweep", {"--out", "new", "--data", "data"}},
     {"train", {"--data", "data", "--out", "new.model", "--epochs", "1", "--preset", "tiny"}},
     {"rig", {"--plate", "plain", "--board-link", "new.board", "--printer-link", "new.printer"}}};
 constexpr int kSkipped = 77;

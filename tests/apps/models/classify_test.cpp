@@ -1,8 +1,5 @@
 // supertac-classify as a process: results, same bits, and what it refuses.
-#include <algorithm>
-
 #include "io/files/json.h"
-#include "models/files/classifier_file.h"
 #include "tests/apps/common/simulated_data.h"
 
 namespace supertac {
@@ -22,17 +19,6 @@ class Classify : public OnSimulatedData {
 };
 
 const std::string kClassify = "supertac-classify --data data --stride 1 --model ";
-
-TEST_F(Classify, KeepsAClassifierThatNamesTextures) {
-  succeed(kClassify + "trial --seeds 1 --epochs 2 --out kept");
-  const NamedClassifier kept = load_classifier(path("kept"));
-  EXPECT_EQ(kept.names, (std::vector<std::string>{"3_Bumps", "6_Ridges"}));
-  const auto answer = kept.name_of(std::vector<float>(256, 0.5F));
-  EXPECT_TRUE(std::ranges::count(kept.names, answer.name) == 1 && answer.probability >= 0.5 &&
-              answer.probability <= 1);
-  EXPECT_THROW((void)kept.name_of(std::vector<float>(64)), std::invalid_argument);
-  EXPECT_THROW((void)load_classifier(path("trial")), std::runtime_error);
-}
 
 TEST_F(Classify, CountsEveryTestWindowAndTellsTexturesApart) {
   succeed(kClassify + "trial --seeds 2 --epochs 20 --json scores.json");

@@ -11,7 +11,6 @@
 #include "hardware/collection/journal.h"
 #include "io/files/json.h"
 #include "io/files/provenance.h"
-#include "models/files/classifier_file.h"
 #include "tests/apps/common/trained.h"
 
 namespace supertac {
@@ -42,12 +41,7 @@ class RoundTrips : public Training {
     };
     const std::string kind = said("kind");
     set_provenance(said(kProvenanceKey));
-    if (kind == "recording") {
-      write_recording(to, recording_of(file));
-    } else if (kind == "texture-classifier") {
-      const NamedClassifier loaded = load_classifier(from);
-      save_classifier(to, *loaded.network, loaded.settings, loaded.names);
-    }
+    if (kind == "recording") write_recording(to, recording_of(file));
     set_provenance("");
     ++kinds_[kind];
     return fs::exists(to);
@@ -143,11 +137,6 @@ TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
   succeed("supertac-simulate --sensor " SUPERTAC_SOURCE
           "/examples/sensors/csv_arduino.json --out mat --plates "
           "plain --trials 1 --passes 1");
-  trained("m4.safetensors", "--scale 4");
-  succeed("supertac-simulate --out two --plates 3_Bumps,6_Ridges --trials 2 --passes 1 --speeds 10");
-  succeed(
-      "supertac-classify --model m4.safetensors --data two --seeds 1 --epochs 1 "
-      "--stride 64 --out classes.safetensors");
   succeed("supertac-sweep" + options("sweep", "--epochs 1 --seeds 0"));
   import_texts();
   collect_and_probe();
@@ -174,7 +163,7 @@ TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
   }
   for (const auto& [kind, rewrite] : again) EXPECT_GT(seen[kind], 0) << kind;
   for (const std::string& kind : not_read) EXPECT_GT(seen[kind], 0) << kind;
-  for (const char* kind : {"recording", "texture-classifier", "pictures", ""})  // "": a model
+  for (const char* kind : {"recording", "pictures", ""})  // "": a model
     EXPECT_GT(kinds_[kind], 0) << kind;
 
   // What a finished run is resumed from, its log and its model.

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <regex>
 
 #include "data/recordings/recording.h"
 #include "io/files/json.h"
@@ -267,6 +268,17 @@ TEST_F(Training, BadInputIsOneLineAndLeavesNothingBehind) {
   EXPECT_FALSE(fs::exists(path("never.safetensors")));
   EXPECT_FALSE(fs::exists(path("never.run")));
   EXPECT_EQ(bytes("damaged.safetensors"), damaged);
+}
+
+// On a terminal the bar has epoch, loss and SSIM of the test side.
+TEST_F(Training, TheBarShowsEpochLossAndTestSsim) {
+  const ProcessResult made =
+      succeed("supertac-train" + options("shown.safetensors", "--epochs 500 --batch 64"), {.terminal = true});
+  EXPECT_TRUE(std::regex_search(
+      made.error,
+      std::regex(
+          R"(training  \[#+\.*\]  \d+ %  epoch \d+/500 loss \d*\.\d+ test SSIM -?\d*\.\d+  \d+:\d\d left)")))
+      << made.error;
 }
 
 }  // namespace

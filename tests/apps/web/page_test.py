@@ -101,7 +101,7 @@ class Stream:
 
     def __init__(self, binaries, source, folder, out, port=0):
         command = [binaries / "supertac-stream", *source, "--model", folder / "model.safetensors"]
-        command += ["--out", out, "--web", str(port), "--force", "--classifier", folder / "classifier.safetensors"]
+        command += ["--out", out, "--web", str(port), "--force"]
         self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=folder)
         self.url = next(m[1] for line in self.process.stderr if (m := re.search(r"live page: (\S+)", line)))
         threading.Thread(target=self.process.stderr.read, daemon=True).start()
@@ -317,7 +317,6 @@ def check_page(binaries, folder, browser, screenshots):
         wait_until("contact", lambda: felt(browser) > 0.06)
         check_changes(browser)
         seen = [check_pause(browser) for _ in range(3)]
-        wait_until("a texture with its probability", lambda: re.fullmatch(r"(6_Ridges|3_Bumps), \d+ %", text(browser, "texture")))
         if screenshots:
             keep_screenshots(browser, screenshots)
         check_record(browser, folder)
@@ -353,11 +352,6 @@ def main():
         subprocess.run([binaries / "supertac-simulate", "--out", "data", "--plates", "6_Ridges", "--passes", "1", "--speeds", "10"], **quiet)
         train = ["--data", "data", "--out", "model.safetensors", "--preset", "tiny", "--split", "none", "--epochs", "1"]
         subprocess.run([binaries / "supertac-train", *train, "--stride", "64", "--quiet"], **quiet)
-        subprocess.run([binaries / "supertac-simulate", "--out", "two", "--plates", "6_Ridges,3_Bumps", "--passes", "1", "--speeds", "10"], **quiet)
-        model = ["--model", "other.safetensors", "--data", "two", "--seeds", "1", "--epochs", "1"]
-        trained = ["--data", "two", "--out", "other.safetensors", "--preset", "tiny", "--epochs", "1", "--stride", "64", "--quiet"]
-        subprocess.run([binaries / "supertac-train", *trained], **quiet)
-        subprocess.run([binaries / "supertac-classify", *model, "--out", "classifier.safetensors", "--quiet"], **quiet)
         make_lively(folder / "model.safetensors")
         with Browser(*programs, folder) as browser:
             check_page(binaries, folder, browser, screenshots)

@@ -321,18 +321,15 @@ TEST(WebView, AnEventHoldsThePictureAndWhatIsKnownOfIt) {
   auto event = parse_json_limited(web_event(state, {}));
   EXPECT_EQ(event["n"], 7);
   EXPECT_EQ(event["picture"], levels_base64(state.picture));
-  for (const char* unknown : {"map", "most", "wide", "distance", "unlike", "texture", "x"})
+  for (const char* unknown : {"map", "most", "wide", "distance", "unlike", "x"})
     EXPECT_FALSE(event.contains(unknown)) << unknown;
   state.half_widths.assign(256, 0.25F), state.distance = 2, state.unlike_training = true, state.x_mm = 3,
-                                        state.y_mm = 4, state.texture = "3_Bumps",
-                                        state.texture_probability = .75;
+                                        state.y_mm = 4;
   state.most_changed = {.taxel = 5, .channel = 1, .rest = 40, .now = 35.5};
   event = parse_json_limited(web_event(state, {.recording = "r", .said = "", .files = {"a", "b"}}));
   EXPECT_EQ(event["wide"], levels_base64(state.half_widths));
   EXPECT_EQ(event["unlike"], true);
   EXPECT_EQ(event["most"].dump(), R"({"channel":1,"now":35.5,"rest":40.0,"taxel":5})");
-  EXPECT_EQ(event["texture"], "3_Bumps");
-  EXPECT_EQ(event["probability"], .75);
   EXPECT_EQ(event["y"], 4);
   EXPECT_EQ(event["files"].size(), 2U);
   state.map = {.region = {-2, 5, 2, 1}, .values = {1, NAN}, .errors = {}};

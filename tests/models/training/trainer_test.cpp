@@ -51,12 +51,11 @@ TEST(Trainer, WithoutSamplingLatentsAreTheMeans) {
 
 // Deleting the augmentation, or another sample's, changes the loss; it is that of windows and truths changed
 // by hand.
-TEST(Trainer, LearnsFromAugmentedAndMirroredWindows) {
+TEST(Trainer, LearnsFromAugmentedWindows) {
   SmallTraining small;
   const WindowSet& windows = small.windows;
   Recipe& settings = small.recipe;
   settings.augment = {.gain = 0.5, .noise = 0.05};
-  settings.mirror = true;
   settings.sampling = false;
   Trainer trainer = small.trainer();
   const Batching batching(all_of(windows), 8, settings.seed);
@@ -69,18 +68,11 @@ TEST(Trainer, LearnsFromAugmentedAndMirroredWindows) {
     augment(settings.augment, settings.seed, batching.sample(0, 0, n), window);
     const auto truth = by_hand.targets.values().subspan(n * 64, 64);
     windows.truth(indices[n], truth);
-    const Mirroring turned = Mirroring::drawn(settings.seed, batching.sample(0, 0, n));
-    mirror(turned, window, 4, 4);
-    mirror(turned, truth, 8, 8);
   }
   const double expected = trainer.objective()(by_hand).loss.total.item();
   EXPECT_NEAR(trainer.train_step().total, expected, 1e-5 * expected);
-  const auto loss = [&] { return small.trainer().train_step().total; };
-  settings.mirror = false;
-  EXPECT_GT(std::abs(loss() - expected), 1e-3 * expected);
   settings.augment = {};
-  settings.mirror = true;
-  EXPECT_GT(std::abs(loss() - expected), 1e-3 * expected);
+  EXPECT_GT(std::abs(small.trainer().train_step().total - expected), 1e-3 * expected);
 }
 
 /// Blurred blobs on an array of 3 x 5 taxels with two channels, drawn four times as fine: five recordings
@@ -288,12 +280,6 @@ TEST(Trainer, RefusesWhatTheArrayCannotDo) {
   small.recipe.augment.dropped = 17;
   EXPECT_EQ(what_of<std::invalid_argument>([&] { small.trainer(); }),
             "augmentation: dropped must be 0 to 16 taxels, got 17");
-  Recipe mirrored = Recipe::named("frame");
-  mirrored.mirror = true;
-  const WindowSet two_numbers = blobs();
-  set_array(mirrored.model, two_numbers.array());
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Objective(two_numbers, mirrored); }),
-            "recipe: mirror is for arrays of one number a taxel, found 2");
 }
 
 }  // namespace
