@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -243,10 +242,8 @@ std::vector<std::size_t> parts_of(const WindowSet& windows, const std::vector<st
 // What the answers of all runs about one set of windows add up to.
 class Tally {
  public:
-  explicit Tally(std::size_t classes) : classes_(classes), confusion_(classes * classes) {}
   // One answer of the current run.
   void add(std::size_t pass, std::int32_t label, std::int32_t answer) {
-    ++confusion_[static_cast<std::size_t>(label) * classes_ + static_cast<std::size_t>(answer)];
     for (ClusterCount* c : {&clusters_[pass], &run_}) c->correct += label == answer ? 1 : 0, c->total += 1;
   }
   void end_run() { runs_.push_back(share({&run_, 1})), run_ = {}; }
@@ -262,17 +259,15 @@ class Tally {
       differences.push_back(count.correct - other.clusters_.at(pass).correct);
     return sign_flip_p(differences);
   }
-  nlohmann::ordered_json to_json(const std::vector<std::string>& names) const {
-    const std::uint64_t all = std::accumulate(confusion_.begin(), confusion_.end(), std::uint64_t{0});
+  nlohmann::ordered_json to_json() const {
+    std::size_t all = 0;
+    for (const auto& [pass, count] : clusters_) all += static_cast<std::size_t>(count.total);
     const Interval i = interval();
     nlohmann::ordered_json json = {{"windows", all / runs_.size()},
                                    {"passes", clusters_.size()},
                                    {"accuracy", accuracy()},
                                    {"ci95_passes", {i.low, i.high}},
                                    {"accuracy_of_runs", runs_}};
-    for (std::size_t row = 0; row < classes_; ++row)
-      for (std::size_t c = 0; c < classes_; ++c)
-        json["confusion"][names[row]][names[c]] = confusion_[row * classes_ + c];
     return json;
   }
 
@@ -283,8 +278,6 @@ class Tally {
     return all;
   }
 
-  std::size_t classes_;
-  std::vector<std::uint64_t> confusion_;          // [label][answer]
   std::map<std::size_t, ClusterCount> clusters_;  // by pass
   ClusterCount run_;
   std::vector<double> runs_;
@@ -308,7 +301,7 @@ std::vector<Parts> experiment(const Arguments& a, const std::vector<View>& views
 #pragma omp critical
     progress.update(++done);
   });
-  std::vector<Parts> results(views.size(), Parts(std::size(kParts), Tally(classes.size())));
+  std::vector<Parts> results(views.size(), Parts(std::size(kParts)));
   for (std::size_t job = 0; job < given.size(); ++job) {
     const Dataset& asked = data[job / views.size() % data.size()];
     const std::vector<std::size_t> parts = parts_of(windows, asked.test);
@@ -326,13 +319,13 @@ std::vector<Parts> experiment(const Arguments& a, const std::vector<View>& views
 // A line for each view and part; views after the first also say how likely their difference to it is by
 // chance.
 nlohmann::ordered_json report(const Arguments& a, const std::vector<View>& views,
-                              const std::vector<Parts>& results, const std::vector<std::string>& classes) {
+                              const std::vector<Parts>& results) {
   nlohmann::ordered_json json;
   for (std::size_t v = 0; v < views.size(); ++v) {
     const std::string name = kViews[static_cast<int>(views[v])];
     for (std::size_t p = 0; p < std::size(kParts); ++p) {
       const Tally& tally = results[v][p];
-      auto& part = json[name][kParts[p]] = tally.to_json(classes);
+      auto& part = json[name][kParts[p]] = tally.to_json();
       const Interval i = tally.interval();
       std::string line = left_aligned(name, 16) + left_aligned(kParts[p], 9) +
                          right_aligned(format(100 * tally.accuracy(), 1), 6) + " % right, " +
@@ -378,7 +371,7 @@ int run(Arguments& a) {
                 {"data", windows.fingerprint()},
                 {"split", split},
                 {"runs", a.integer("seeds", 1, 1000)},
-                {"views", report(a, views, results, classes)}});
+                {"views", report(a, views, results)}});
   return kExitOk;
 }
 

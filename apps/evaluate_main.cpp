@@ -202,8 +202,6 @@ void declare(Arguments& a) {
            "of a measured truth: where a pixel shows more, from 0 to 1, something is in contact (default: "
            "from its noise "
            "at rest)");
-  a.option("batch", "N", "windows that are drawn at once; their pictures do not depend on it", "64");
-  a.decides_nothing();
   a.option("outputs", "FILE",
            "write inputs as the network takes them, outputs, truths and predicted errors as safetensors")
       .writes();

@@ -11,9 +11,9 @@
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "apps/import/tables.h"
+#include "apps/import/text_folder.h"
 #include "data/plates/plate_file.h"
 #include "data/recordings/imports/table_import.h"
-#include "data/registration/text_folder.h"
 #include "io/files/safetensors.h"
 
 namespace supertac {

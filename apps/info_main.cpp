@@ -86,25 +86,6 @@ void print_metadata(const Arguments& arguments, const SafetensorsFile& file) {
   }
 }
 
-/// When a model was made and how long it took stands in its run folder, if that is still of this model.
-void print_run(const Arguments& arguments, nlohmann::ordered_json& card) {
-  namespace fs = std::filesystem;
-  constexpr std::uint64_t kMostBytes = 1 << 20;
-  const fs::path settings = fs::path(arguments.text("FILE")).replace_extension(".run") / "settings.json";
-  std::error_code error;
-  if (!fs::exists(settings, error)) return;
-  try {
-    const auto run = parse_json_limited(read_text_file(settings, kMostBytes));
-    if (run.value("content", "") != card["content"].get<std::string>()) return;
-    card["run"] = run.at("provenance");
-  } catch (const std::exception&) {
-    return;  // of another program
-  }
-  for (const char* key : {"command", "began", "seconds"})
-    print_row(arguments, std::string("run.") + key,
-              text_of(card["run"].value(key, nlohmann::ordered_json())));
-}
-
 /// Frames, duration and rate; reads the file as a recording, so that what is wrong with it is said here too.
 void print_recording(const Arguments& arguments, nlohmann::ordered_json& card) {
   const Recording recording = read_recording(arguments.text("FILE"));
@@ -174,7 +155,6 @@ int run(Arguments& arguments) {
   print_row(arguments, "checksum", ours ? "ok" : "absent: written by another program, damage cannot be seen");
   if (kind == "recording") print_recording(arguments, result);
   print_metadata(arguments, file);
-  print_run(arguments, result);
   print_row(arguments, "values in all tensors", std::to_string(result["values"].get<std::uint64_t>()));
   for (const auto& [name, tensor] : file.tensors()) {
     print_row(arguments, "  " + name, tensor.dtype + " " + shape_text(tensor.shape));

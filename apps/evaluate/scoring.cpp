@@ -77,8 +77,7 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, con
   const auto history = static_cast<std::size_t>(a.integer("history", 0, kMost));
   std::erase_if(tested.split.test, [&](std::uint32_t i) { return windows.history(i) < history; });
   if (tested.split.test.empty())
-    throw UsageError("--history " + a.text("history") +
-                     " leaves none of the test windows; give a smaller number");
+    throw UsageError("--history " + a.text("history") + " leaves none of the test windows; give less");
   const auto limit = static_cast<std::size_t>(a.integer("limit", 0, kMost));
   if (limit > 0) tested.split.test = evenly_spaced(tested.split.test, limit);
   if (tested.split.train.empty())
@@ -109,21 +108,18 @@ void draw_all(const Arguments& a, const Ensemble& network, const WindowSet& wind
               const std::function<void(const Drawn&)>& use) {
   std::vector<std::vector<float>> plain(baselines.size(), std::vector<float>(windows.image().pixels()));
   Progress progress(a, "evaluating", test.size(), "pictures");
-  for_each_output(
-      network, windows, test,
-      [&](const EvaluatedBatch& b) {
-        for (std::size_t n = 0; n < b.size(); ++n) {
-          Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.predicted_error(n), b.input(n)};
-          for (std::size_t k = 0; k < baselines.size(); ++k) {
-            baselines[k]->predict(b.input(n), plain[k]);
-            drawn.pictures.push_back(plain[k]);
-          }
-          use(drawn);
-        }
-        progress.update(b.first + b.size());
-        return !interrupted();
-      },
-      static_cast<std::size_t>(a.integer("batch", 1, 4096)));
+  for_each_output(network, windows, test, [&](const EvaluatedBatch& b) {
+    for (std::size_t n = 0; n < b.size(); ++n) {
+      Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.predicted_error(n), b.input(n)};
+      for (std::size_t k = 0; k < baselines.size(); ++k) {
+        baselines[k]->predict(b.input(n), plain[k]);
+        drawn.pictures.push_back(plain[k]);
+      }
+      use(drawn);
+    }
+    progress.update(b.first + b.size());
+    return !interrupted();
+  });
   stop_if_interrupted();
 }
 

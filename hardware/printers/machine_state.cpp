@@ -26,7 +26,7 @@ struct StateRule {
   bool homed = false;  // matters for a homed machine only: a confirmed origin is in the coordinates of now
 };
 
-constexpr int kAttempts = 6;  // at being understood
+constexpr int kMostQuestions = 6;  // at being understood
 constexpr const char* kByHand = "set it by hand and start again";
 
 // Old and new Marlin by their answers: an old one says nothing where a new one reports, and is set all the
@@ -70,7 +70,7 @@ std::optional<MarlinLink::Answer> run(MarlinLink& link, const std::string& comma
 /// Whether the firmware took it. Klipper is silent then: what it says may be a damaged complaint.
 bool set_by(MarlinLink& link, const std::string& command) {
   std::optional<MarlinLink::Answer> answer = run(link, command);
-  for (int i = 1; i < kAttempts && link.capabilities().klipper && answer && !answer->replies.empty(); ++i)
+  for (int i = 1; i < kMostQuestions && link.capabilities().klipper && answer && !answer->replies.empty(); ++i)
     answer = run(link, command);
   return answer.has_value();
 }
@@ -96,7 +96,7 @@ std::optional<std::string> value_by(MarlinLink& link, const StateRule& rule) {
     return answer ? value_in(*answer, rule.label) : std::nullopt;
   };
   std::optional<std::string> before = value();
-  for (int i = 0; i < kAttempts && !(before && is_wanted(*before, rule)); ++i)
+  for (int i = 0; i < kMostQuestions && !(before && is_wanted(*before, rule)); ++i)
     if (const auto now = std::exchange(before, value()); now == before) break;
   return before;
 }

@@ -1,8 +1,8 @@
 // What all programs share. A program is a file JOB_main.cpp that defines
 //   void declare(Arguments&);  its options
 //   int run(Arguments&);       its work; returns the exit code
-// in namespace supertac, and a line of apps/CMakeLists.txt with its name and purpose, from which its main()
-// is written (main.cpp.in) and `supertac` lists it.
+// in namespace supertac, and a line of apps/CMakeLists.txt with its name and purpose, by which main()
+// (main.cpp) runs it and `supertac` lists it.
 #pragma once
 
 #include <string>

@@ -19,7 +19,7 @@
 namespace supertac {
 namespace {
 
-constexpr double kSeconds = 30, kPenalty = 0.3, kMostUnlike = 8, kMostOfPrior = 0.6, kLeastNoise = 2e-4;
+constexpr double kSeconds = 30, kPenalty = 0.3, kMostUnlike = 8, kMostOfPrior = 0.6, kLeastFittedNoise = 2e-4;
 constexpr std::size_t kNearest = 60;
 
 // A number of a body as it is regressed: drawn evenly in this form, and back.
@@ -103,7 +103,7 @@ void measure(const Recording& r, Sensor& sensor) {
     rest.push_back(static_cast<float>(double{before[s]} + (levels[s] - sensor.scale.rest) / gain));
   }
   if (sensor.array.channels == 1) sensor.rest = rest;
-  sensor.body.noise = std::max(kLeastNoise, median(noises));
+  sensor.body.noise = std::max(kLeastFittedNoise, median(noises));
   sensor.body.uncertainty.erase("noise");
 }
 

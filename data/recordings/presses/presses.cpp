@@ -21,7 +21,7 @@ constexpr double kMarginSigmas = 2.5;
 constexpr double kNarrowest = 0.25;  // of a cell: a bell that is narrower would fall between cells
 constexpr int kPointsOfATaxel = 16;
 
-enum Draw : std::uint64_t { kSkin, kNoise, kOfStrength, kTimes = 10, kFit = 100, kTaxels = 1000 };
+enum PressDraw : std::uint64_t { kSkin, kNoise, kOfStrength, kTimes = 10, kFit = 100, kTaxels = 1000 };
 constexpr std::uint64_t kSamples = 1'000'000;
 
 // What is known of the body, as far as it is known.

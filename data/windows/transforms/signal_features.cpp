@@ -14,7 +14,8 @@ namespace {
 
 constexpr std::size_t kLeastFrames = 16, kFramesLookedAt = 64, kLagShare = 8;
 constexpr double kStillest = 0.0005, kLeastSwing = 0.003;
-constexpr std::size_t kAtOnce = 16;  // sums that run side by side: one alone waits for each of its additions
+constexpr std::size_t kSumsAtOnce =
+    16;  // sums that run side by side: one alone waits for each of its additions
 
 /// The frames of a window that are looked at, their means taken off.
 struct Swings {
@@ -29,9 +30,9 @@ struct Swings {
 // The mean over time of value(t, k) for each k of `out`, added up in the order of time.
 template <class Value>
 void mean_over_time(std::size_t frames, std::span<float> out, const Value& value) {
-  for (std::size_t first = 0; first < out.size(); first += kAtOnce) {
-    const std::size_t count = std::min(kAtOnce, out.size() - first);
-    std::array<double, kAtOnce> sums{};
+  for (std::size_t first = 0; first < out.size(); first += kSumsAtOnce) {
+    const std::size_t count = std::min(kSumsAtOnce, out.size() - first);
+    std::array<double, kSumsAtOnce> sums{};
     for (std::size_t t = 0; t < frames; ++t)
       for (std::size_t k = 0; k < count; ++k) sums[k] += value(t, first + k);
     for (std::size_t k = 0; k < count; ++k)

@@ -155,24 +155,12 @@ TEST_F(Import, ReportsEveryFile) {
   EXPECT_EQ(recording.metadata.at("registration_reliable"), "no");
 }
 
-TEST_F(Import, ACutPassIsFlaggedNotRefused) {
-  write_pass(path("text/3_Bumps/1/1.txt"), rest_lines(3));
-  EXPECT_TRUE(contains(succeed("supertac-import text --out out").out, "not reliable"));
-}
-
 TEST_F(Import, BadInputIsOneLineAndLeavesNothing) {
-  const std::string good = rest_lines(100);
-  const std::string columns_15 = "1 1 1 1 1 1 1 1 1 1 1 1 1 1 1\n";
   const std::tuple<std::string, std::string, std::string> cases[] = {
       {"3_Bumps/1/1.txt", "", "is empty"},
-      {"3_Bumps/1/1.txt", "no numbers at all\n", "1 of 1 lines are not 16 voltages"},
-      {"3_Bumps/1/1.txt", columns_15, "1 with fewer columns"},
-      {"3_Bumps/1/1.txt", rest_lines(1) + columns_15, "1 with fewer columns"},
+      {"3_Bumps/1/1.txt", rest_lines(1) + "1 1 1 1 1 1 1 1 1 1 1 1 1 1 1\n", "1 with fewer columns"},
       {"3_Bumps/1/1.txt", std::string(3000, '\xff'), "is it a recording?"},
-      {"7_Moons/1/1.txt", good, "unknown plate: "},
-      {"3_Bumps/one/1.txt", good, "expected a number from 1"},
-      {"3_Bumps/1/first.txt", good, "expected a number from 1"},
-      {"3_Bumps/1/1.csv", good, "holds no <plate>/<trial>/<pass>.txt"}};
+      {"7_Moons/1/1.txt", rest_lines(100), "unknown plate: "}};
   for (const auto& [name, text, message] : cases) {
     std::filesystem::remove_all(path("text"));
     write_pass(path("text/" + name), text);

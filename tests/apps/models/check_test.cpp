@@ -114,7 +114,6 @@ TEST_F(Audit, AModelSaysWhatItWasMadeFrom) {
             "supertac-train --epochs 4 --batch 8 --timesteps 32 --scale 2 --stride 8 --latent 3");
   EXPECT_EQ(provenance["seed"], "3");
   EXPECT_EQ(provenance["parents"]["recordings"].get<std::string>().size(), 64U);
-  EXPECT_GT(card["run"]["seconds"], 0);
   const auto folder = nlohmann::json::parse(run("supertac-info data --json -").out);
   EXPECT_EQ(folder["content"], provenance["parents"]["recordings"]);
   EXPECT_TRUE(contains(folder["provenance"][0]["command"].get<std::string>(), "supertac-simulate"));

@@ -7,7 +7,8 @@
 namespace supertac {
 namespace {
 
-std::vector<BoardFrame> decode(FrameDecoder& decoder, std::span<const std::byte> bytes, std::size_t piece) {
+std::vector<BoardFrame> decode_board(FrameDecoder& decoder, std::span<const std::byte> bytes,
+                                     std::size_t piece) {
   std::vector<BoardFrame> frames;
   for (std::size_t at = 0; at < bytes.size(); at += piece) {
     decoder.push(bytes.subspan(at, std::min(piece, bytes.size() - at)),
@@ -98,7 +99,7 @@ TEST(FrameDecoder, PiecesOfAnySizeGiveTheSameFrames) {
   const DamagedStream stream = damaged_stream(200, 0, 0);
   for (const std::size_t piece : {1U, 7U, 163U, 164U, 165U, 4096U}) {
     FrameDecoder decoder;
-    EXPECT_EQ(decode(decoder, stream.bytes, piece), stream.sent) << "pieces of " << piece;
+    EXPECT_EQ(decode_board(decoder, stream.bytes, piece), stream.sent) << "pieces of " << piece;
     EXPECT_EQ(decoder.counters().discarded_bytes, 0U);
   }
 }
@@ -106,7 +107,7 @@ TEST(FrameDecoder, PiecesOfAnySizeGiveTheSameFrames) {
 TEST(FrameDecoder, RecoversEveryUndamagedFrameAtAThousandthDroppedBytes) {
   const DamagedStream stream = damaged_stream(20000, 1e-3, 0);
   FrameDecoder decoder;
-  const std::vector<BoardFrame> got = decode(decoder, stream.bytes, 164);
+  const std::vector<BoardFrame> got = decode_board(decoder, stream.bytes, 164);
   std::size_t found = 0;
   for (const BoardFrame& frame : got) found += found < stream.intact.size() && frame == stream.intact[found];
   RecordProperty("undamaged", static_cast<int>(stream.intact.size()));
@@ -119,7 +120,7 @@ TEST(FrameDecoder, RecoversEveryUndamagedFrameAtAThousandthDroppedBytes) {
 TEST(FrameDecoder, AcceptsHardlyAnyWrongFrameUnderMixedFaults) {
   const DamagedStream stream = damaged_stream(20000, 1e-3, 1e-3);
   FrameDecoder decoder;
-  const std::vector<BoardFrame> got = decode(decoder, stream.bytes, 1000);
+  const std::vector<BoardFrame> got = decode_board(decoder, stream.bytes, 1000);
   std::size_t next = 0, wrong = 0;
   for (const BoardFrame& frame : got) {
     std::size_t at = next;

@@ -11,7 +11,7 @@
 namespace supertac {
 namespace {
 
-Sensor sensor_of(const std::string& array, const std::string& frame) {
+Sensor sensor_with(const std::string& array, const std::string& frame) {
   return sensor_of_json("{" + array + R"(,"pressed":"higher","range":[0,1000],"frame":)" + frame + "}",
                         "test");
 }
@@ -20,27 +20,28 @@ Sensor sensor_of(const std::string& array, const std::string& frame) {
 std::map<std::string, Sensor> sensors() {
   const std::string mat = R"("rows":4,"columns":5)", skin = R"("rows":4,"columns":4,"channels":3)";
   return {
-      {"commas", sensor_of(mat, R"({"kind":"text"})")},
+      {"commas", sensor_with(mat, R"({"kind":"text"})")},
       {"blanks",
-       sensor_of(mat, R"({"kind":"text","separator":" ","skip":[1,3],"time":{"column":0,"unit":"ms"}})")},
-      {"tabs", sensor_of(mat, R"({"kind":"text","separator":"\t","time":{"column":20,"unit":"s"}})")},
-      {"list", sensor_of(mat, R"({"kind":"json"})")},
-      {"object", sensor_of(skin, R"({"kind":"json","values":"b","time":{"key":"t","unit":"us"}})")},
-      {"header", sensor_of(skin, R"({"kind":"binary","header":"AA55","type":"i16"})")},
-      {"trailer", sensor_of(mat, R"({"kind":"binary","trailer":"0D0A7E","type":"f32","endian":"big"})")},
-      {"sum", sensor_of(mat, R"({"kind":"binary","header":"FF","type":"u8","checksum":"sum8"})")},
+       sensor_with(mat, R"({"kind":"text","separator":" ","skip":[1,3],"time":{"column":0,"unit":"ms"}})")},
+      {"tabs", sensor_with(mat, R"({"kind":"text","separator":"\t","time":{"column":20,"unit":"s"}})")},
+      {"list", sensor_with(mat, R"({"kind":"json"})")},
+      {"object", sensor_with(skin, R"({"kind":"json","values":"b","time":{"key":"t","unit":"us"}})")},
+      {"header", sensor_with(skin, R"({"kind":"binary","header":"AA55","type":"i16"})")},
+      {"trailer", sensor_with(mat, R"({"kind":"binary","trailer":"0D0A7E","type":"f32","endian":"big"})")},
+      {"sum", sensor_with(mat, R"({"kind":"binary","header":"FF","type":"u8","checksum":"sum8"})")},
       {"crc",
-       sensor_of(mat, R"({"kind":"binary","header":"24","type":"u32","checksum":"crc16-modbus","trailer":"21",
+       sensor_with(mat,
+                   R"({"kind":"binary","header":"24","type":"u32","checksum":"crc16-modbus","trailer":"21",
         "time":{"type":"u32","unit":"ms"}})")},
-      {"modbus", sensor_of(mat, R"({"kind":"binary","header":"010328","type":"u16","endian":"big",
+      {"modbus", sensor_with(mat, R"({"kind":"binary","header":"010328","type":"u16","endian":"big",
         "checksum":{"kind":"crc16-modbus","from":0,"endian":"little"}})")},
-      {"wide", sensor_of(mat, R"({"kind":"binary","header":"AA55","type":"i32","checksum":"crc32",
+      {"wide", sensor_with(mat, R"({"kind":"binary","header":"AA55","type":"i32","checksum":"crc32",
         "fields":[{"counter":"u16"},{"values":12},{"skip":3},{"values":8},"time"],
         "time":{"type":"u32","unit":"us"}})")},
-      {"crc8", sensor_of(mat, R"({"kind":"binary","header":"AA55","type":"i8","checksum":"crc8"})")},
-      {"sum16", sensor_of(mat, R"({"kind":"binary","header":"A5","type":"u16",
+      {"crc8", sensor_with(mat, R"({"kind":"binary","header":"AA55","type":"i8","checksum":"crc8"})")},
+      {"sum16", sensor_with(mat, R"({"kind":"binary","header":"A5","type":"u16",
         "fields":[{"values":20},{"counter":"u8"}],"checksum":{"kind":"sum16","from":0,"endian":"big"}})")},
-      {"ccitt", sensor_of(mat, R"({"kind":"binary","header":"2424","type":"u16","checksum":"crc16-ccitt",
+      {"ccitt", sensor_with(mat, R"({"kind":"binary","header":"2424","type":"u16","checksum":"crc16-ccitt",
         "endian":"big","time":{"type":"u16","unit":"ms"}})")}};
 }
 
@@ -131,7 +132,7 @@ TEST(SensorDecoder, AHeaderInTheValuesOfARestingSensorIsNoFrame) {
 // within a frame. Nothing is lost, and where bytes are, only what was torn.
 TEST(SensorDecoder, ValuesThatReadAsTheHeaderCostNoFrame) {
   const Sensor sensor =
-      sensor_of(R"("rows":12,"columns":32)", R"({"kind":"binary","header":"AA55","type":"u8"})");
+      sensor_with(R"("rows":12,"columns":32)", R"({"kind":"binary","header":"AA55","type":"u8"})");
   std::mt19937 random(8);
   std::string bytes;
   std::vector<std::vector<float>> sent;

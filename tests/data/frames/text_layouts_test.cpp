@@ -11,7 +11,7 @@
 namespace supertac {
 namespace {
 
-struct Layout {
+struct TextLayout {
   std::string what;
   std::vector<Heard> heard;
   std::size_t values = 0;
@@ -41,7 +41,7 @@ std::string clock_of_day(double s) {
   return two(whole / 3600) + ":" + two(whole / 60 % 60) + ":" + two(whole % 60) + "." + of.substr(1);
 }
 
-Layout layout_of(std::uint64_t seed) {
+TextLayout text_layout_of(std::uint64_t seed) {
   Draws draw(seed);
   constexpr std::pair<std::size_t, std::size_t> kArrays[] = {{4, 4},  {3, 3}, {8, 8},  {4, 6},
                                                              {6, 10}, {2, 5}, {16, 16}};
@@ -62,7 +62,7 @@ Layout layout_of(std::uint64_t seed) {
   const bool dead = draw.often(0.3), none = draw.often(0.15), boot = draw.often(0.3), wide = draw.often(0.1),
              remarks = draw.often(0.2);
   const double base = draw.often(0.3) ? -200 : 300, apart = draw.often(0.5) ? 3 : 40;
-  Layout layout;
+  TextLayout layout;
   layout.values = values;
   layout.what = "seed " + std::to_string(seed) + ", " + std::to_string(rows) + "x" + std::to_string(columns) +
                 " between '" + between + "' in " + open;
@@ -138,7 +138,7 @@ Layout layout_of(std::uint64_t seed) {
 }
 
 /// Objects of JSON, scientific notation, a header and two arrays in a line.
-Layout second_layout_of(std::uint64_t seed) {
+TextLayout second_layout_of(std::uint64_t seed) {
   Draws draw(seed);
   constexpr std::pair<std::size_t, std::size_t> kArrays[] = {{4, 4}, {5, 5}, {8, 8}, {4, 6}};
   const auto [rows, columns] = kArrays[draw.below(std::size(kArrays))];
@@ -147,7 +147,7 @@ Layout second_layout_of(std::uint64_t seed) {
   const bool nested = draw.often(0.5), counter = draw.often(0.5), pose = draw.often(0.5);
   const double base = 300 + 100 * draw.normal();
   constexpr const char* kForms[] = {"JSON", "scientific", "header", "two arrays"};
-  Layout layout;
+  TextLayout layout;
   layout.values = values, layout.clock = stamp > 0;
   layout.what = "second family, seed " + std::to_string(seed) + ", " + std::to_string(rows) + "x" +
                 std::to_string(columns) + ", " + kForms[form];
@@ -202,14 +202,14 @@ Layout second_layout_of(std::uint64_t seed) {
 
 /// Firmware's habits: glued units, a line for each taxel with its row and column, hexadecimal without 0x, a
 /// baseline that drifts beside the signals.
-Layout third_layout_of(std::uint64_t seed) {
+TextLayout third_layout_of(std::uint64_t seed) {
   Draws draw(seed + 1000);
   constexpr std::pair<std::size_t, std::size_t> kArrays[] = {{4, 4}, {3, 3}, {2, 6}};
   const auto [rows, columns] = kArrays[draw.below(std::size(kArrays))];
   const std::size_t cells = rows * columns, form = seed % 4;
   const std::string between = draw.often(0.5) ? "\t" : " ", unit = draw.often(0.5) ? "g" : "mV";
   const bool stamped = draw.often(0.5);
-  Layout layout;
+  TextLayout layout;
   layout.values = form == 3 ? 2 * cells : cells, layout.clock = form == 0 && stamped;
   constexpr const char* kForms[] = {"units", "row,column,value", "hexadecimal", "drift"};
   layout.what = "third family, seed " + std::to_string(seed) + ", " + kForms[form];
@@ -248,7 +248,7 @@ Layout third_layout_of(std::uint64_t seed) {
 
 /// Right: all frames that were sent but two, as they were sent and with their times where the lines say them;
 /// none besides. A frame with "nan" has the others' mean there.
-bool reads(const Layout& layout, const Sensor& draft) {
+bool reads(const TextLayout& layout, const Sensor& draft) {
   if (draft.values() != layout.values || draft.frame.time.has_value() != layout.clock) return false;
   const auto decoder = make_decoder(draft);
   std::size_t next = 0, right = 0, wrong = 0;
@@ -275,10 +275,10 @@ bool reads(const Layout& layout, const Sensor& draft) {
 }
 
 /// Seeds 1 to `count`: none is drafted wrong, at least `share` of them right.
-void expect_right_or_refused(Layout (*layout_of_seed)(std::uint64_t), int count, double share) {
+void expect_right_or_refused(TextLayout (*layout_of_seed)(std::uint64_t), int count, double share) {
   int right = 0, refused = 0, silent = 0;
   for (int seed = 1; seed <= count; ++seed) {
-    const Layout layout = layout_of_seed(static_cast<std::uint64_t>(seed));
+    const TextLayout layout = layout_of_seed(static_cast<std::uint64_t>(seed));
     const ProbeReport report = probe(layout.heard, "here", {});
     std::string said;
     for (const std::string& line : report.says) said += line + "\n";
@@ -297,7 +297,7 @@ void expect_right_or_refused(Layout (*layout_of_seed)(std::uint64_t), int count,
   EXPECT_GE(right, share * count) << refused << " refused, " << silent << " wrong";
 }
 
-TEST(TextLayouts, AreDraftedRightOrRefused) { expect_right_or_refused(layout_of, 80, 0.85); }
+TEST(TextLayouts, AreDraftedRightOrRefused) { expect_right_or_refused(text_layout_of, 80, 0.85); }
 // Of the third only those with units can be right.
 TEST(TextLayouts, HabitsOfFirmwareAreNeverWrong) { expect_right_or_refused(third_layout_of, 40, 0.25); }
 TEST(TextLayouts, OfObjectsAndSeveralArraysToo) { expect_right_or_refused(second_layout_of, 40, 0.85); }

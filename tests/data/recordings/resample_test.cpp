@@ -12,7 +12,7 @@
 namespace supertac {
 namespace {
 
-const ResampleSettings kWide{.scaling = Scaling{.rest = 3.0, .span = 2.0}};
+const ResampleSettings kWideRange{.scaling = Scaling{.rest = 3.0, .span = 2.0}};
 
 void remove_frame(Recording& recording, std::size_t i) {
   const auto at = [i](auto& values, std::size_t n) {
@@ -35,10 +35,10 @@ TEST(Scaling, MapsRestToZeroAndClips) {
 
 TEST(Resample, LeavesARecordingAtItsRateAsItIs) {
   const Recording recording = make_recording({});
-  const Track track = resample(recording, kWide);
+  const Track track = resample(recording, kWideRange);
   ASSERT_EQ(track.frames(), recording.frames());
   for (std::size_t i = 0; i < recording.signals.size(); ++i)
-    ASSERT_EQ(track.samples[i], (*kWide.scaling)(recording.signals[i])) << i;
+    ASSERT_EQ(track.samples[i], (*kWideRange.scaling)(recording.signals[i])) << i;
   for (std::size_t i = 0; i < recording.position_mm.size(); ++i)
     ASSERT_NEAR(track.position_mm[i], recording.position_mm[i], 1e-4) << i;
   EXPECT_EQ(track.held, 0U);
@@ -48,10 +48,10 @@ TEST(Resample, LeavesARecordingAtItsRateAsItIs) {
 
 TEST(Resample, AveragesWhatArrivedInAPeriod) {
   const Recording recording = make_recording({.frames = 901, .rate_hz = 900});
-  const Track track = resample(recording, kWide);
+  const Track track = resample(recording, kWideRange);
   ASSERT_EQ(track.frames(), 301U);
   // Period 10 is centred on frame 30 and holds 29, 30, 31.
-  EXPECT_NEAR(track.samples[10 * kTaxels], (*kWide.scaling)(2.0F + 0.030F), 1e-6);
+  EXPECT_NEAR(track.samples[10 * kTaxels], (*kWideRange.scaling)(2.0F + 0.030F), 1e-6);
   EXPECT_NEAR(track.position_mm[2 * 10 + 1], 30 + 10.0 * 10 / 300, 1e-5);
 }
 
@@ -59,7 +59,7 @@ TEST(Resample, LooksNoFurtherAheadThanHalfAPeriod) {
   const Recording recording = make_recording({.frames = 901, .rate_hz = 900});
   Recording changed = recording;
   for (std::size_t i = 32 * kTaxels; i < changed.signals.size(); ++i) changed.signals[i] = 1.5F;
-  const Track before = resample(recording, kWide), after = resample(changed, kWide);
+  const Track before = resample(recording, kWideRange), after = resample(changed, kWideRange);
   for (std::size_t i = 0; i < 11 * kTaxels; ++i) ASSERT_EQ(before.samples[i], after.samples[i]);
   EXPECT_NE(before.samples[11 * kTaxels], after.samples[11 * kTaxels]);
 }
@@ -67,7 +67,7 @@ TEST(Resample, LooksNoFurtherAheadThanHalfAPeriod) {
 TEST(Resample, HoldsALostSampleAndCountsIt) {
   Recording recording = make_recording({});
   remove_frame(recording, 40);
-  const Track track = resample(recording, kWide);
+  const Track track = resample(recording, kWideRange);
   ASSERT_EQ(track.frames(), 100U);
   EXPECT_EQ(track.held, 1U);
   EXPECT_EQ(track.gaps, 0U);
@@ -79,7 +79,7 @@ TEST(Resample, HoldsALostSampleAndCountsIt) {
 TEST(Resample, NeverFillsAGap) {
   Recording recording = make_recording({});
   for (std::size_t i = 60; i < 100; ++i) recording.time_s[i] += 0.2;
-  const Track track = resample(recording, kWide);
+  const Track track = resample(recording, kWideRange);
   EXPECT_EQ(track.frames(), 100U);
   EXPECT_EQ(track.gaps, 1U);
   EXPECT_EQ(track.held, 0U);
@@ -92,7 +92,7 @@ TEST(Resample, CallsASilenceOfOverFiftyMillisecondsAGap) {
   const auto gaps_after = [](double silence_s) {
     Recording recording = make_recording({});
     for (std::size_t i = 60; i < 100; ++i) recording.time_s[i] += silence_s - 1 / 300.0;
-    return resample(recording, kWide).gaps;
+    return resample(recording, kWideRange).gaps;
   };
   EXPECT_EQ(gaps_after(0.049), 0U);
   EXPECT_EQ(gaps_after(0.051), 1U);
@@ -101,7 +101,7 @@ TEST(Resample, CallsASilenceOfOverFiftyMillisecondsAGap) {
 TEST(Resample, TakesADamagedFrameAsLost) {
   Recording recording = make_recording({});
   recording.signals[40 * kTaxels + 3] = std::numeric_limits<float>::quiet_NaN();
-  const Track track = resample(recording, kWide);
+  const Track track = resample(recording, kWideRange);
   EXPECT_EQ(track.damaged, 1U);
   EXPECT_EQ(track.held, 1U);
   for (const float v : track.samples) ASSERT_TRUE(std::isfinite(v));
@@ -110,7 +110,7 @@ TEST(Resample, TakesADamagedFrameAsLost) {
 TEST(Resample, ToleratesJitter) {
   Recording recording = make_recording({});
   for (std::size_t i = 1; i < 100; ++i) recording.time_s[i] += (i % 2 == 0 ? 0.3 : -0.3) / 300;
-  const Track track = resample(recording, kWide);
+  const Track track = resample(recording, kWideRange);
   EXPECT_EQ(track.frames(), 100U);
   EXPECT_EQ(track.held, 0U);
 }
@@ -118,7 +118,7 @@ TEST(Resample, ToleratesJitter) {
 TEST(Resample, KeepsUnknownPositionsUnknown) {
   Recording recording = make_recording({});
   recording.position_mm.clear();
-  const Track none = resample(recording, kWide);
+  const Track none = resample(recording, kWideRange);
   EXPECT_TRUE(std::isnan(none.position_mm[17]));
   EXPECT_EQ(none.position_mm.size(), 200U);
 }
@@ -127,20 +127,20 @@ TEST(Resample, KeepsUnknownPositionsUnknown) {
 TEST(Resample, ATruthIsThatOfTheNearestFrame) {
   Recording recording = make_recording({});
   for (std::size_t i = 1; i < recording.time_s.size(); ++i) recording.time_s[i] += i % 2 == 0 ? 1e-9 : 1e-3;
-  const Track track = resample(recording, kWide);
+  const Track track = resample(recording, kWideRange);
   ASSERT_GT(track.frames(), 50U);
   for (std::size_t j = 0; j < 50; ++j) ASSERT_EQ(track.recorded[j], j);
 }
 
-TEST(Resample, OfNothingIsNothing) { EXPECT_EQ(resample(Recording{}, kWide).frames(), 0U); }
+TEST(Resample, OfNothingIsNothing) { EXPECT_EQ(resample(Recording{}, kWideRange).frames(), 0U); }
 
 TEST(Resample, RefusesTimesThatDoNotIncreaseAndSizesThatDisagree) {
   Recording recording = make_recording({});
   recording.time_s[7] = recording.time_s[6];
-  EXPECT_ERROR(resample(recording, kWide), std::runtime_error, "time stamps must increase, frame 7");
+  EXPECT_ERROR(resample(recording, kWideRange), std::runtime_error, "time stamps must increase, frame 7");
   recording = make_recording({});
   recording.signals.pop_back();
-  EXPECT_EQ(what_of<std::runtime_error>([&] { resample(recording, kWide); }),
+  EXPECT_EQ(what_of<std::runtime_error>([&] { resample(recording, kWideRange); }),
             "recording: 100 time stamps need 1600 voltages, 0 or 200 coordinates and 0 or 100 lifts, got "
             "1599, 200 and 0; record or import the pass again");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { resample(make_recording({}), {.rate_hz = 0}); }),

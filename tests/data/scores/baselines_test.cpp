@@ -78,10 +78,10 @@ TEST(Bicubic, RefusesOtherSizes) {
             "baseline: the image expects 64 values, got 256");
 }
 
-WindowSet make_set() { return surface_windows(0.2, 0.5); }
+WindowSet make_baseline_set() { return surface_windows(0.2, 0.5); }
 
 TEST(Baselines, UndoTheScaleOfTheSignal) {
-  const WindowSet set = make_set();
+  const WindowSet set = make_baseline_set();
   const UpsampledFrame bicubic(set, all_of(set));
   // The least-squares line is shrunk below 1 / .5 because bicubic misses part of the shape.
   EXPECT_GT(bicubic.slope(), 1.2);
@@ -92,7 +92,7 @@ TEST(Baselines, UndoTheScaleOfTheSignal) {
 }
 
 TEST(Baselines, AreOrderedOnASignalThatShowsTheSurface) {
-  const WindowSet set = make_set();
+  const WindowSet set = make_baseline_set();
   const auto baselines = fit_baselines(set, all_of(set));
   std::vector<std::string> names;
   for (const auto& baseline : baselines) names.push_back(baseline->name());
@@ -102,7 +102,7 @@ TEST(Baselines, AreOrderedOnASignalThatShowsTheSurface) {
 }
 
 TEST(Baselines, MeanImageIsTheMeanTruthWhateverItSees) {
-  const WindowSet set = make_set();
+  const WindowSet set = make_baseline_set();
   const std::vector<std::uint32_t> train{3, 400};
   const MeanImage mean(set, train);
   std::vector<float> out(256), a(256), b(256);
@@ -113,7 +113,7 @@ TEST(Baselines, MeanImageIsTheMeanTruthWhateverItSees) {
 }
 
 TEST(Baselines, AllButRidgeSeeTheLastFrameOnly) {
-  const WindowSet set = make_set();
+  const WindowSet set = make_baseline_set();
   const auto baselines = fit_baselines(set, all_of(set));
   const std::vector<float> window = set.window(200);
   std::vector<float> out(256), again(256);
@@ -137,7 +137,7 @@ TEST(Baselines, ASignalThatNeverChangesGivesTheMean) {
 }
 
 TEST(Baselines, NeedWindowsToFitTo) {
-  const WindowSet set = make_set();
+  const WindowSet set = make_baseline_set();
   EXPECT_EQ(what_of<std::invalid_argument>([&] { fit_baselines(set, {}); }),
             "baseline: there is no example to fit to");
   const auto baselines = fit_baselines(set, all_of(set));

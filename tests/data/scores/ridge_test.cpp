@@ -15,10 +15,10 @@ namespace {
 
 constexpr int kSteps = 16;
 
-WindowSet make_set(double noise, int passes = 5) { return surface_windows(0.3, 0.4, noise, passes); }
+WindowSet make_ridge_set(double noise, int passes = 5) { return surface_windows(0.3, 0.4, noise, passes); }
 
 TEST(Ridge, UsesWhatTheWindowHoldsBetterThanTheLastFrame) {
-  const WindowSet set = make_set(0.01);
+  const WindowSet set = make_ridge_set(0.01);
   const Split split = make_split(set, SplitKind::pass, 1);
   const Ridge ridge(set, split.train);
   EXPECT_EQ(ridge.name(), "ridge");
@@ -27,7 +27,7 @@ TEST(Ridge, UsesWhatTheWindowHoldsBetterThanTheLastFrame) {
 }
 
 TEST(Ridge, SaysHowFarItIsAndCanBeEnded) {
-  const WindowSet set = make_set(0.01);
+  const WindowSet set = make_ridge_set(0.01);
   const auto train = all_of(set);
   std::size_t last = 0, all = 0;
   const Ridge whole(set, train, [&](std::size_t done, std::size_t parts) {
@@ -44,7 +44,7 @@ TEST(Ridge, SaysHowFarItIsAndCanBeEnded) {
 }
 
 TEST(Ridge, IsLinearInTheWindow) {
-  const WindowSet set = make_set(0);
+  const WindowSet set = make_ridge_set(0);
   const auto train = all_of(set);
   const Ridge ridge(set, train);
   EXPECT_DOUBLE_EQ(ridge.penalty(), 1e-5) << "nothing to guard against without noise";
@@ -58,14 +58,14 @@ TEST(Ridge, IsLinearInTheWindow) {
 
 TEST(Ridge, NoiseRaisesThePenalty) {
   const auto penalty = [](double noise) {
-    const WindowSet set = make_set(noise);
+    const WindowSet set = make_ridge_set(noise);
     return Ridge(set, all_of(set)).penalty();
   };
   EXPECT_GT(penalty(0.2), penalty(0));
 }
 
 TEST(Ridge, OnePassIsEnoughAndADeadArrayGivesTheMean) {
-  const WindowSet one = make_set(0.01, 1);
+  const WindowSet one = make_ridge_set(0.01, 1);
   EXPECT_LT(mean_error(one, {5, 300}, Ridge(one, all_of(one))), 0.02);
   Recording rest = make_recording({.frames = 300, .start_y_mm = 50});
   std::fill(rest.signals.begin(), rest.signals.end(), 3.0F);
@@ -79,7 +79,7 @@ TEST(Ridge, OnePassIsEnoughAndADeadArrayGivesTheMean) {
 // W solves the normal equations: their residual X'(X W - Y) is the penalty's part of them. Asked of the
 // pictures: over the windows that it was fitted to, what is left of each pixel has no mean.
 TEST(Ridge, LeavesNoMeanError) {
-  const WindowSet set = make_set(0.05);
+  const WindowSet set = make_ridge_set(0.05);
   const auto train = all_of(set);
   const Ridge ridge(set, train);
   std::vector<float> out(256), truth(256);
@@ -93,7 +93,7 @@ TEST(Ridge, LeavesNoMeanError) {
 }
 
 TEST(Ridge, DoesNotDependOnTheNumberOfThreads) {
-  const WindowSet set = make_set(0);
+  const WindowSet set = make_ridge_set(0);
   const auto train = all_of(set);
   const int before = omp_get_max_threads();
   std::vector<float> pictures[2];
@@ -111,7 +111,7 @@ TEST(Ridge, DoesNotDependOnTheNumberOfThreads) {
 }
 
 TEST(Ridge, RefusesNoWindows) {
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Ridge(make_set(0.01, 1), {}); }),
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Ridge(make_ridge_set(0.01, 1), {}); }),
             "ridge: there is no window to fit to");
 }
 

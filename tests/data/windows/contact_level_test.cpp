@@ -10,13 +10,13 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kPixels = 64, kFrames = 200;
+constexpr std::size_t kPixels = 64, kTruths = 200;
 
 // Every second frame is pressed by 0.3 and more on a quarter of the pixels.
 std::vector<float> film(double noise, double rest) {
   const RandomStream random(1, 0);
   std::vector<float> truth;
-  for (std::size_t f = 0; f < kFrames; ++f)
+  for (std::size_t f = 0; f < kTruths; ++f)
     for (std::size_t p = 0; p < kPixels; ++p) {
       const double pressed = f % 2 == 0 && p < kPixels / 4 ? 0.3 + 0.5 * random.uniform(f) : 0;
       truth.push_back(static_cast<float>(
@@ -31,7 +31,7 @@ TEST(ContactLevel, TellsTheFilmsNoiseFromATouch) {
     const float level = contact_level(truth, kPixels);
     EXPECT_GT(level, 0.02F) << rest;
     EXPECT_LT(level, 0.08F) << rest;
-    for (std::size_t f = 0; f < kFrames; ++f) {
+    for (std::size_t f = 0; f < kTruths; ++f) {
       const auto first = truth.begin() + static_cast<std::ptrdiff_t>(f * kPixels);
       EXPECT_EQ(*std::max_element(first, first + kPixels) > level, f % 2 == 0) << f;
     }

@@ -120,11 +120,6 @@ TEST(LiveWindow, IsNormalisedLikeOneOfTraining) {
   EXPECT_GT(expect_windows_of_set(recording, LiveWindow(settings), true), 400U);
 }
 
-TEST(LiveWindow, ASensorAtTheModelsRateGivesThemWithEveryFrame) {
-  const Recording recording = make_recording({.frames = 60});
-  EXPECT_EQ(expect_windows_of_set(recording, LiveWindow(live_settings(300))), 45U);
-}
-
 // Three or four frames in each sample: the newest sample is the mean of those that have come.
 TEST(LiveWindow, OneForEveryFrameOfTheBoardWhateverThePhase) {
   const std::vector<double> times{0, 0.001, 0.002, 0.003, 0.004};
@@ -171,34 +166,6 @@ TEST(LiveWindow, AppliesTheMovingAverageOfTraining) {
   }
 }
 
-TEST(LiveWindow, HoldsALostFrameAndNeverLooksIntoTheFuture) {
-  const Recording recording = make_recording({.frames = 40});
-  LiveWindow whole(live_settings(300)), lossy(live_settings(300));
-  Window expected(kTimesteps * kTaxels), window(kTimesteps * kTaxels);
-  for (std::size_t i = 0; i < 30; ++i) {
-    whole.push(recording.time_s[i], volts_of(recording, i));
-    if (i != 24) lossy.push(recording.time_s[i], volts_of(recording, i));
-  }
-  ASSERT_TRUE(whole.window(expected) && lossy.window(window));
-  for (std::size_t n = 0; n < kTimesteps; ++n) {
-    const std::size_t frame = 14 + n;
-    const float* same = &expected[(frame == 24 ? n - 1 : n) * kTaxels];
-    for (std::size_t k = 0; k < kTaxels; ++k) ASSERT_EQ(window[n * kTaxels + k], same[k]) << frame;
-  }
-}
-
-TEST(LiveWindow, ALostFrameBeforeTheOldestSampleIsHeldFromFurtherBack) {
-  const Recording recording = make_recording({.frames = 40});
-  LiveWindow live(live_settings(300));
-  for (std::size_t i = 0; i < 30; ++i)
-    if (i < 12 || i > 16) live.push(recording.time_s[i], volts_of(recording, i));
-  Window window(kTimesteps * kTaxels);
-  ASSERT_TRUE(live.window(window));  // frames 14 ... 29; 14, 15, 16 repeat 11
-  const float held = kWide(recording.signals[11 * kTaxels]);
-  for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(window[n * kTaxels], held);
-  EXPECT_EQ(window[3 * kTaxels], kWide(recording.signals[17 * kTaxels]));
-}
-
 TEST(LiveWindow, StartsAnewAfterAGapEvenOneLongerThanTheWindow) {
   for (const double gap : {0.06, 10.0}) {
     Recording recording = make_recording({.frames = 60});
@@ -242,13 +209,6 @@ TEST(LiveWindow, TakesADamagedFrameAsLost) {
   Window window(kTimesteps * kTaxels);
   ASSERT_TRUE(live.window(window));
   for (const float v : window) ASSERT_TRUE(std::isfinite(v));
-}
-
-TEST(LiveWindow, NothingBeforeTheFirstFrame) {
-  LiveWindow live(live_settings(300));
-  Window window(kTimesteps * kTaxels, -1);
-  EXPECT_FALSE(live.window(window));
-  EXPECT_EQ(window[0], -1);
 }
 
 TEST(LiveWindow, RefusesSettingsOutOfRangeAndAWrongRoom) {

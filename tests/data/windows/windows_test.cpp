@@ -155,14 +155,6 @@ TEST(Windows, InTheAirTheTruthIsFlat) {
   EXPECT_FALSE(in_contact(truth));
 }
 
-TEST(Windows, AFlaggedReliablePassIsKept) {
-  Recording recording = make_recording({});
-  recording.metadata["registration_reliable"] = "yes";
-  WindowSet set(wide_settings(16));
-  set.add(recording);
-  EXPECT_EQ(set.size(), 85U);
-}
-
 TEST(Windows, OfAnyArray) {
   SimulatorSettings settings;
   settings.array = {.rows = 6, .columns = 6, .pitch_mm = 2};

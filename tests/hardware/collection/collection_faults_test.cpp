@@ -14,15 +14,15 @@
 namespace supertac {
 namespace {
 
-constexpr Point3 kLow{99.7, 101.17, 97.81};
+constexpr Point3 kLowAt{99.7, 101.17, 97.81};
 
 /// One short collection on a simulated rig whose journal meets a fault.
 struct FaultyCollection {
-  FaultyCollection() : rig(running_rig({.head = kLow})) {
+  FaultyCollection() : rig(running_rig({.head = kLowAt})) {
     settings.bed.plan.passes = 1;
     settings.bed.plan.slide = 2;
     settings.bed.plan.poll_interval_s = 0.02;
-    settings.bed.origin = kLow;
+    settings.bed.origin = kLowAt;
     settings.journal = folder / "journal";
     settings.header = "fault";
     // Simulated time would otherwise run away from the journal's thread, which would then write all at once.

@@ -11,7 +11,7 @@ namespace supertac {
 namespace {
 
 constexpr Firmware kFirmwares[] = {Firmware::marlin, Firmware::marlin_before_2_1_2, Firmware::klipper};
-constexpr Point3 kLow{99.7, 101.17, 99.81};
+constexpr Point3 kLowDown{99.7, 101.17, 99.81};
 
 TEST(MachineState, EachLeftoverAloneIsSetAndPutBack) {
   const std::vector<LeftOver> marlin = {
@@ -25,7 +25,7 @@ TEST(MachineState, EachLeftoverAloneIsSetAndPutBack) {
   for (const Firmware firmware : kFirmwares) {
     for (const LeftOver& left : firmware == Firmware::klipper ? klipper : marlin) {
       const FaultVerdict verdict = run_faulty_collection(
-          running_rig({.firmware = firmware, .left_over = left}), {.passes = 1, .slide = 20}, kLow);
+          running_rig({.firmware = firmware, .left_over = left}), {.passes = 1, .slide = 20}, kLowDown);
       EXPECT_TRUE(verdict.complete) << verdict.error;
       EXPECT_EQ(verdict.broken, "") << static_cast<int>(firmware) << ", " << left.inches << left.relative
                                     << left.speed_percent << " " << left.mesh_mm << " " << left.offset.z;
@@ -200,7 +200,7 @@ TEST(MachineState, AQuoteIsMatchedWhereItStands) {
 TEST(MachineState, AFasterOrSlowerMachineIsNamedByItsSpeed) {
   for (const double slowness : {0.5, 0.66, 0.9, 1.1, 2.0}) {
     const FaultVerdict verdict =
-        run_faulty_collection(running_rig({.slowness = slowness}), {.passes = 1, .slide = 60}, kLow);
+        run_faulty_collection(running_rig({.slowness = slowness}), {.passes = 1, .slide = 60}, kLowDown);
     EXPECT_EQ(verdict.broken + verdict.doubt + verdict.error, "") << slowness;
     EXPECT_NEAR(verdict.named_mm_s * slowness, 10, 0.15) << slowness;
     EXPECT_LT(verdict.worst_mm, 0.1) << slowness;
@@ -212,7 +212,7 @@ TEST(MachineState, AnotherAccelerationIsMeasured) {
     for (const double speed : {5.0, 10.0, 25.0, 50.0}) {
       const FaultVerdict verdict =
           run_faulty_collection(running_rig({.realtime_position = false, .acceleration = acceleration}),
-                                {.passes = 1, .slide = 60, .speed = speed}, kLow);
+                                {.passes = 1, .slide = 60, .speed = speed}, kLowDown);
       EXPECT_EQ(verdict.broken + verdict.error, "") << acceleration << ", " << speed;
       EXPECT_LT(verdict.worst_mm, speed < 50 ? 0.3 : 0.5) << acceleration << ", " << speed;
       if (speed < 25) {

@@ -16,8 +16,8 @@ namespace {
 
 constexpr Dim kWindows = 1000;
 
-ModelFile model_of(const std::string& preset, const TaxelArray& array, Grouping grouping,
-                   bool last_frame = false) {
+ModelFile onnx_model_of(const std::string& preset, const TaxelArray& array, Grouping grouping,
+                        bool last_frame = false) {
   SuperTacSettings settings = SuperTacSettings::of_preset(preset);
   set_array(settings, array);
   settings.grouping = grouping;
@@ -74,14 +74,14 @@ TEST(Onnx, OnnxruntimeDrawsOurPictures) {
   const TaxelArray rig, other{3, 5, 2.5, 2};
   for (const char* preset : {"tiny", "paper"}) {
     const std::string name(preset);
-    write_case(folder, name + "_4x4", model_of(name, rig, Grouping::horizontal), kWindows);
-    write_case(folder, name + "_3x5x2", model_of(name, other, Grouping::vertical), kWindows);
+    write_case(folder, name + "_4x4", onnx_model_of(name, rig, Grouping::horizontal), kWindows);
+    write_case(folder, name + "_3x5x2", onnx_model_of(name, other, Grouping::vertical), kWindows);
   }
-  write_case(folder, "last_frame", model_of("tiny", other, Grouping::vertical, true), 50);
-  ModelFile plain = model_of("tiny", rig, Grouping::horizontal);
+  write_case(folder, "last_frame", onnx_model_of("tiny", other, Grouping::vertical, true), 50);
+  ModelFile plain = onnx_model_of("tiny", rig, Grouping::horizontal);
   plain.input.scaling.per_window = false;
   write_case(folder, "not_normalised", plain, 50);
-  ModelFile frames = model_of("frame", {6, 7, 2.5, 2}, Grouping::horizontal);
+  ModelFile frames = onnx_model_of("frame", {6, 7, 2.5, 2}, Grouping::horizontal);
   frames.input.scaling.per_window = false;
   write_case(folder, "single_frames", frames, 50);
   const char* python = std::getenv("SUPERTAC_PYTHON");
@@ -97,7 +97,7 @@ TEST(Onnx, OnnxruntimeDrawsOurPictures) {
 
 // Where onnxruntime is not installed this tells that the graph was changed since it was last compared.
 TEST(Onnx, TheGraphIsTheOneThatWasCompared) {
-  const std::string bytes = onnx_of(model_of("tiny", {}, Grouping::horizontal));
+  const std::string bytes = onnx_of(onnx_model_of("tiny", {}, Grouping::horizontal));
   EXPECT_EQ(bytes.find("TopK"), std::string::npos) << "pnnx drops its second output, and fails";
   Hash hash;
   hash.add(bytes);

@@ -13,7 +13,7 @@ namespace supertac {
 namespace {
 
 /// Two by two taxels whose counts rise, 100 frames/s.
-Sensor mat() {
+Sensor mat_of_tables() {
   Sensor sensor;
   sensor.name = "mat";
   sensor.array = {2, 2, 5, 1};
@@ -28,7 +28,8 @@ class TableImport : public testing::Test {
     write_file(folder_.file(name), text);
     return folder_.file(name);
   }
-  Recording import(const std::string& path, const std::string& map = "", const Sensor& sensor = mat()) {
+  Recording import(const std::string& path, const std::string& map = "",
+                   const Sensor& sensor = mat_of_tables()) {
     return recording_of_table(path, read_table(path), column_map(map), sensor);
   }
   void expect_refusal(const std::string& path, const std::string& map, const std::string& text) {
@@ -88,8 +89,8 @@ TEST_F(TableImport, ColumnsByNameMillisecondsAndPositions) {
             (std::vector<float>{101, 200, 300, 400}));
   EXPECT_EQ(r.position_mm[2], 0.5F);
   EXPECT_EQ(r.position_mm[3], 20.0F);
-  EXPECT_EQ(r.signal_scale, mat().scale);
-  EXPECT_EQ(r.array, mat().array);
+  EXPECT_EQ(r.signal_scale, mat_of_tables().scale);
+  EXPECT_EQ(r.array, mat_of_tables().array);
 }
 
 TEST_F(TableImport, ColumnsByNumberRangesAndOtherSeparators) {
@@ -119,7 +120,7 @@ TEST_F(TableImport, RemarksAndEmptyLinesTakeNoTime) {
 }
 
 TEST_F(TableImport, TaxelsStandInTheSensorsOrder) {
-  Sensor sensor = mat();
+  Sensor sensor = mat_of_tables();
   sensor.order = {3, 2, 1, 0};
   EXPECT_EQ(import(file(lines(20, "50,60,70,80\n")), "", sensor).signals[0], 80.0F);
 }
@@ -130,7 +131,7 @@ TEST_F(TableImport, ADriftIsTakenAwayWhereTheSensorsFileAsks) {
     const int press = i >= 5900 ? 300 : 0;
     text += std::to_string(40 + i / 100 + press) + ",40,40,40\n";
   }
-  Sensor sensor = mat();
+  Sensor sensor = mat_of_tables();
   EXPECT_EQ(import(file(text), "", sensor).signals[4 * 5800], 98);
   sensor.follow_rest_s = 5;
   const Recording r = import(file(text), "", sensor);
@@ -208,7 +209,7 @@ TEST_F(TableImport, NumpyArraysAndWhatTheyMayNotBe) {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = 50 + static_cast<float>(i);
   EXPECT_EQ(import(npy("a.npy", "<f4", "10, 4", values)).signals, values);
   EXPECT_EQ(import(npy("a.npy", "<f4", "10, 2, 2", values)).signals, values);
-  Sensor row = mat();
+  Sensor row = mat_of_tables();
   row.array.rows = 1, row.array.columns = 4;
   const std::string path = npy("a.npy", "<f4", "10, 2, 2", values);
   EXPECT_EQ(what_of<FileError>([&] { recording_of_table(path, read_table(path), {}, row); }),

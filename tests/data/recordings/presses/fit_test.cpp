@@ -12,7 +12,7 @@
 namespace supertac {
 namespace {
 
-Sensor mat() {
+Sensor mat_to_fit() {
   Sensor sensor;
   sensor.array = {.rows = 6, .columns = 10, .pitch_mm = 8, .channels = 1};
   sensor.scale = {.unit = "counts", .rest = 40, .span = -860};
@@ -26,10 +26,10 @@ TEST(BodyFit, FindsKnownBodiesWithinTheStatedUncertainty) {
   const RandomStream random(77, 1);
   int told = 0, within = 0, farther = 0;
   std::map<std::string, int> of;
-  const BodyFitter fitter(mat(), 1);
+  const BodyFitter fitter(mat_to_fit(), 1);
   constexpr std::uint64_t kBodies = 12;
   for (std::uint64_t i = 0; i < kBodies; ++i) {
-    Sensor truth = mat();
+    Sensor truth = mat_to_fit();
     truth.body.skin_mm = 8 * std::lerp(0.4, 1.4, random.uniform(10 * i));
     truth.body.knee = std::lerp(0.3, 3.0, random.uniform(10 * i + 1));
     truth.body.crosstalk_rows = 0.4 * random.uniform(10 * i + 2);
@@ -59,7 +59,7 @@ TEST(BodyFit, FindsKnownBodiesWithinTheStatedUncertainty) {
 
   // Once more with what was found: the rests are those of the recording still, and so is a skin that was
   // known.
-  Sensor uneven = mat();
+  Sensor uneven = mat_to_fit();
   uneven.body.skin_mm = 6;
   Recording touched = simulate_touching(uneven, 30, 5);
   uneven.rest.assign(60, 50);
@@ -71,13 +71,13 @@ TEST(BodyFit, FindsKnownBodiesWithinTheStatedUncertainty) {
   EXPECT_FALSE(once.sensor.body.uncertainty.contains("skin_mm"));
   EXPECT_EQ(once.lines()[1], "skin_mm 6.000 +- 0.00");
 
-  Sensor slow = mat();
+  Sensor slow = mat_to_fit();
   slow.rate_hz = 1;
   EXPECT_EQ(what_of<std::runtime_error>([&] { BodyFitter(slow, 1); }),
             "a body cannot be fitted to 1 frames a second: of half a minute too few would be touched; leave "
             "the fit out, and presses are simulated of bodies as different as arrays are");
 
-  Recording still = simulate_touching(mat(), 10, 1);
+  Recording still = simulate_touching(mat_to_fit(), 10, 1);
   for (float& signal : still.signals) signal = 40;
   EXPECT_EQ(what_of<std::runtime_error>([&] { fitter(still); }),
             "too little was pressed: expected 100 frames or more in which a taxel shows 8 % of the range; "

@@ -12,7 +12,7 @@ namespace {
 
 constexpr real kNan = std::numeric_limits<real>::quiet_NaN();
 
-struct Sample {
+struct Latents {
   SuperTac model = random_network();
   Tensor windows = uniform({2, 32, 16}, 1), truth = uniform({2, 8, 8, 1}, 3);
 
@@ -22,22 +22,22 @@ struct Sample {
   }
 };
 
-TEST(Diagnosis, SaysNothingOfAFiniteLoss) { EXPECT_EQ(Sample().where(), ""); }
+TEST(Diagnosis, SaysNothingOfAFiniteLoss) { EXPECT_EQ(Latents().where(), ""); }
 
 TEST(Diagnosis, NamesAnInput) {
-  Sample s;
+  Latents s;
   s.windows.data()[16 * 5 + 9] = kNan;  // taxel 9 belongs to group 2
   EXPECT_EQ(s.where(), "an input of conv1d in encoder.2.conv.0 is not finite");
 }
 
 TEST(Diagnosis, NamesTheTruth) {
-  Sample s;
+  Latents s;
   s.truth.data()[70] = kNan;
   EXPECT_EQ(s.where(), "an input of l2_loss behind upsampler.out is not finite");
 }
 
 TEST(Diagnosis, NamesAParameterAndALayer) {
-  Sample s;
+  Latents s;
   weights_of(s.model, "upsampler.fc.weight").fill(real(3e38));
   EXPECT_EQ(s.where(), "the output of linear in upsampler.fc is the first that is not finite");
   weights_of(s.model, "upsampler.out.bias").fill(kNan);
@@ -45,7 +45,7 @@ TEST(Diagnosis, NamesAParameterAndALayer) {
 }
 
 TEST(Diagnosis, NamesTheGradientNearestToTheLoss) {
-  Sample s;
+  Latents s;
   backward(supertac_loss(s.model.forward(s.windows, normal_eps(2, 3, 2)), s.truth, {}).total);
   EXPECT_EQ(gradient_not_finite(s.model.parameters()), "");
   for (const Parameter& p : s.model.parameters()) {

@@ -1,4 +1,4 @@
-#include "data/registration/text_folder.h"
+#include "apps/import/text_folder.h"
 
 #include <omp.h>
 
