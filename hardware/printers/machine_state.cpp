@@ -70,7 +70,8 @@ std::optional<MarlinLink::Answer> run(MarlinLink& link, const std::string& comma
 /// Whether the firmware took it. Klipper is silent then: what it says may be a damaged complaint.
 bool set_by(MarlinLink& link, const std::string& command) {
   std::optional<MarlinLink::Answer> answer = run(link, command);
-  for (int i = 1; i < kMostQuestions && link.capabilities().klipper && answer && !answer->replies.empty(); ++i)
+  for (int i = 1; i < kMostQuestions && link.capabilities().klipper && answer && !answer->replies.empty();
+       ++i)
     answer = run(link, command);
   return answer.has_value();
 }
