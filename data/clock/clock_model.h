@@ -24,24 +24,22 @@ struct Lateness {
   double jitter_s = 0;  ///< one in ten is later, of these one in ten later than twice that, and so on
   double waited_s = 0;  ///< so long at most a frame waits that the read in front of it did not take
   bool known = false;
+  double unsure = 1;  ///< so many times as late the earliest of some reads may be: few have been seen
 };
 
 namespace clock_model {
 
 // The assumptions of the header.
 constexpr std::size_t kReads = 16;
-constexpr double kReadsS = 0.25, kSteady = 2e-4;
-constexpr double kLateShare = 0.9, kDecades = 13, kChance = 3;
+constexpr double kSteady = 2e-4;
+constexpr double kDecades = 13;   // what has a chance of so many does not happen
 constexpr double kOldestS = 0.6;  // a frame waited no longer before anything is known; stamps jump no farther
-constexpr double kAnyRate = 20;   // of a rate that is a word
-constexpr double kNever = 1e9, kMostStampS = 1e11;
-constexpr std::size_t kMostEnds = 512;
+constexpr double kNever = 1e18, kMostStampS = 1e10;
 constexpr double kSure = 18;           // median deviations
 constexpr std::size_t kWitnesses = 3;  // reads, or stamps, in a row that bear each other out
-constexpr double kDense = 0.1;
+constexpr double kDense = 0.15;
 constexpr double kKnown = 0.05;        // a rate that is surer tells what was lost
 constexpr double kClockDrifts = 0.01;  // at most, from the port's
-constexpr double kClockOff = 0.5;      // of a device's clock from the port's, as a share
 
 /// Whether these frames, which came so long after a read that had emptied the port, are more than can have
 /// been made since: then they had waited, too, and belong to that read.
@@ -55,7 +53,7 @@ inline double shortest(const Rate& rate) { return rate.period_s * (1 - std::min(
 /// So long (s) must reads go on, whose delays are `jitter_s`, until one was on time: those that come sooner
 /// after one another than they are late are late together.
 inline double span_s(double jitter_s, double unit_s) {
-  return unit_s > 0 ? kReads * unit_s : std::clamp(kReads * jitter_s, kReadsS, 8 * kReadsS);
+  return unit_s > 0 ? kReads * unit_s : std::clamp(kReads * jitter_s, 0.25, 2.0);
 }
 
 /// Whether so many reads in a row, `seconds` in all, are late by `rise_s` for good: of those that are later
@@ -90,7 +88,7 @@ Rate slope_of(std::span<const ReadEnd> ends, double period_s, double farthest, d
 
 /// How late `ends` are: each against the earliest of a window of kReads and more, which lasts `span_s`. Where
 /// reads are late together, the earliest is late, too: by as much as that of the next window is earlier. The
-/// most of this, were it as rare as 1 of the windows and kChance decades, shows a jitter of its own.
+/// most of this, were it as rare as 1 of the windows and three decades, shows a jitter of its own.
 Lateness lateness_of(std::span<const ReadEnd> ends, const Rate& rate, double span_s);
 
 }  // namespace clock_model

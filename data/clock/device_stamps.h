@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "data/clock/clock_model.h"
 #include "data/sensors/sensor.h"
 
 namespace supertac {
@@ -36,19 +37,20 @@ class DeviceStamps {
     bool anew = false;                   ///< reset, or nothing but the first stamps of all were wrong
   };
   /// `elapsed_s`: from the arrival of the frame before to that of this one.
-  Reading read(double stamp_s, double elapsed_s, double period_s);
+  Reading read(double stamp_s, double elapsed_s, const Rate& rate);
   double unit_s() const { return settings_.stamp_unit_s; }
   /// On the device's clock, later than any frame that has arrived.
   double latest_s() const;
 
  private:
   struct Mark {
-    double raw_s = 0, time_s = 0, arrived_s = 0, step_s = 0;
+    double raw_s = 0, off_s = 0, arrived_s = 0, step_s = 0;
     double least_lag_s = 0;  // of its chain, behind the arrivals
     std::uint64_t number = 0, before = 0, root = 0, length = 0;
+    double time_s() const { return raw_s + off_s; }
   };
   double step_from(const Mark& one, double raw_s, double most_s) const;
-  Mark chained(double raw_s, double period_s) const;
+  Mark chained(double raw_s, const Rate& rate) const;
   ClockSettings settings_;
   std::vector<Mark> marks_;  // the newest, believed or not
   Mark head_;                // the newest that is believed

@@ -44,7 +44,7 @@ Rate slope_of(std::span<const ReadEnd> ends, double period_s, double farthest, d
 }
 
 Lateness lateness_of(std::span<const ReadEnd> ends, const Rate& rate, double span_s) {
-  const std::size_t count = ends.size();
+  const std::size_t count = rate.uncertain < 10 ? ends.size() : 0;  // else levels say nothing
   const auto level = [&](std::size_t b) {
     return ends[b].time_s + ends[b].slack_s - rate.period_s * ends[b].last;
   };
@@ -58,7 +58,7 @@ Lateness lateness_of(std::span<const ReadEnd> ends, const Rate& rate, double spa
   std::vector<Window> windows(count);
   std::vector<double> late;
   std::size_t end = count, pairs = 0;
-  double fell_s = 0;
+  double fell_s = 0, ahead = 0;
   std::vector<double> waits;
   for (std::size_t b = count; b-- > 0;) {
     while (!lows.empty() && falling(lows.back()) >= falling(b)) lows.pop_back();
@@ -67,6 +67,7 @@ Lateness lateness_of(std::span<const ReadEnd> ends, const Rate& rate, double spa
     while (lows.front() >= end) lows.pop_front();
     if (b > 0)
       waits.push_back(ends[b].time_s - rate.period_s * ends[b].first - level(lows.front()) - ends[b].gap_s);
+    ahead += 0.5 * (ends[lows.front()].last - ends[b].first) / static_cast<double>(count);
     if (end - b <= kReads || ends[end - 1].time_s - ends[b].time_s < span_s) continue;
     late.push_back(falling(b) - falling(lows.front()));
     windows[b] = {end, lows.front()};
@@ -75,11 +76,13 @@ Lateness lateness_of(std::span<const ReadEnd> ends, const Rate& rate, double spa
   }
   if (late.size() < kReads) return {};
   const auto decades = [](std::size_t n) { return std::log10(std::max(1.0, static_cast<double>(n))); };
-  const double together_s = kReads * fell_s / (kChance + decades(pairs / kReads));
-  const double jitter_s = std::max(quantile(late, kLateShare), together_s);
-  const double most = *std::ranges::max_element(waits), usual = quantile(waits, kLateShare);
+  const double together_s = kReads * fell_s / (3 + decades(pairs / kReads));
+  const double jitter_s = std::max(quantile(late, 0.9), together_s);
+  // A read that is late by more than a period holds up those behind it: few then say little.
+  const double few = jitter_s > rate.period_s ? 2.0 * kReads / static_cast<double>(late.size()) : 0;
+  const double most = *std::ranges::max_element(waits), usual = quantile(waits, 0.9);
   const double waited_s = usual + (kDecades - 1) * (most - usual) / (decades(waits.size()) - 1);
-  return {jitter_s, std::max(0.0, waited_s), true};
+  return {jitter_s, std::max(0.0, waited_s + unsure_s * ahead), true, 1 + few};
 }
 
 }  // namespace supertac::clock_model

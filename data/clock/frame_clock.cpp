@@ -4,14 +4,18 @@
 #include <cmath>
 #include <utility>
 
+#include "io/numbers/median.h"
+
 namespace supertac {
 
 using namespace clock_model;
 
 ClockSettings clock_settings(const Sensor& sensor, bool stored) {
-  ClockSettings settings{.period_s = 1 / sensor.rate_hz,
-                         .tolerance = sensor.frame.kind == FrameKind::board ? 0.005 : kAnyRate,
-                         .stored = stored};
+  ClockSettings settings{
+      .period_s = 1 / sensor.rate_hz,
+      .tolerance = sensor.frame.kind == FrameKind::board ? 0.005 : 20,  // of a rate that is a word
+
+      .stored = stored};
   if (sensor.frame.kind == FrameKind::board) settings.period_s = rig::kFramePeriodS;
   if (!sensor.frame.time) return settings;
   const std::string& type = sensor.frame.time->type;
@@ -29,14 +33,11 @@ FrameClock::FrameClock(const ClockSettings& settings)
       measured_s_(settings.period_s),
       stamps_(settings) {}
 
-// A stamp that is too early is no low: the one before it was right.
 void FrameClock::keep_low(std::size_t at) {
-  const ReadEnd& burst = window_[at];
-  double level_s = level(burst);
-  if (settings_.stamp_unit_s > 0 && at > 0) level_s = std::max(level_s, level(window_[at - 1]));
+  const double level_s = level(window_[at]);
   while (!lows_.empty() && (lows_.back().burst == closed_ || lows_.back().level_s >= level_s))
     lows_.pop_back();
-  lows_.push_back({closed_, level_s, burst.last});
+  lows_.push_back({closed_, level_s, window_[at].last});
 }
 
 // By so much (s) the earliest of the last reads may have been late.
@@ -87,6 +88,7 @@ double FrameClock::periods_lost() const {
 
 // The envelope stays late by whole periods: frames were lost; unless it comes back.
 void FrameClock::count_lost() {
+  if (lows_.empty()) return;
   const double low_s = lows_.front().level_s, rise = low_s - level_s_, period = rate_.period_s;
   // Until it is known how late frames come, what a known rate has lost is put off.
   if (levelled_ && rise > 0 && !late_.known && settings_.tolerance < kKnown) return;
@@ -97,7 +99,7 @@ void FrameClock::count_lost() {
 }
 
 void FrameClock::learn() {
-  if (ends_.size() > kMostEnds) ends_.erase(ends_.begin(), ends_.end() - kMostEnds / 2);
+  if (ends_.size() > 512) ends_.erase(ends_.begin(), ends_.end() - 256);
   Rate found = slope_of(ends_, rate_.period_s, 0.125, settings_.stamp_unit_s);
   const double off = found.period_s / settings_.period_s,
                differs = std::abs(found.period_s / rate_.period_s - 1);
@@ -114,6 +116,8 @@ void FrameClock::learn() {
   measured_s_ = found.period_s;
   if (stays) return;
   rate_.period_s = found.period_s;
+  // What was the median of levels by quite another period is none by this.
+  if (settings_.stamp_unit_s > 0 && differs > 0.25) window_.clear();
   lows_.clear();
   const std::uint64_t closed = std::exchange(closed_, closed_ - window_.size());
   for (std::size_t at = 0; at < window_.size(); ++at) ++closed_, keep_low(at);
@@ -133,7 +137,8 @@ FrameDate FrameClock::dated(double due_s, double from_s, double to_s) {
   FrameDate date{.from_s = std::min(from_s, to_s), .to_s = to_s, .missing = missing()};
   date.time_s = std::clamp(due_s, date.from_s, date.to_s);
   if (!first_ && date.time_s <= last_.time_s) {
-    date.time_s = last_.time_s + 1e-3 * rate_.period_s;
+    date.time_s =
+        std::max(last_.time_s + 1e-3 * rate_.period_s, std::nextafter(last_.time_s, kNever * kNever));
     date.to_s = std::max(date.to_s, date.time_s);
   }
   first_ = false;
@@ -171,46 +176,55 @@ void FrameClock::date(std::span<const FrameArrival> frames, std::vector<FrameDat
   }
 }
 
+// Two stamps in a row may be wrong: the median of five is an arrival.
+void FrameClock::take_stamp() {
+  if (stamped_.size() < 2 * kWitnesses - 1) return;
+  std::vector<double> levels;
+  for (std::size_t k = 1; k < 2 * kWitnesses; ++k) levels.push_back(level(stamped_[stamped_.size() - k]));
+  const double number = stamped_[stamped_.size() - kWitnesses].last;
+  take(number, number, median(levels) + rate_.period_s * number + settings_.stamp_unit_s);
+}
+
 FrameDate FrameClock::by_stamp(const FrameArrival& frame) {
   const double step = 1 + frame.damaged, period = rate_.period_s;
   const double elapsed_s = first_ ? 0 : frame.time_s - arrived_s_;
-  damaged_ += frame.damaged, number_ += step, unbelieved_s_ += settings_.stored ? 0 : elapsed_s;
+  damaged_ += frame.damaged, number_ += step;
   const DeviceStamps::Reading reading =
-      frame.stamp_s ? stamps_.read(*frame.stamp_s, elapsed_s, period) : DeviceStamps::Reading{};
+      frame.stamp_s ? stamps_.read(*frame.stamp_s, elapsed_s, rate_) : DeviceStamps::Reading{};
   settings_.stamp_unit_s = stamps_.unit_s();
   const double unit = settings_.stamp_unit_s;
   const double due = first_ ? 0 : last_.time_s + period * step;
   if (unit <= 0) return dated(due, due, due);  // stored, without stamps
   const double farthest_s = settings_.stored ? due + period * step : stamps_.latest_s() + kOldestS;
   if (!reading.time_s && first_) return dated(0, -kMostStampS, kMostStampS);
-  if (!reading.time_s) return dated(due, last_.from_s, std::max(due, farthest_s));
+  if (!reading.time_s) return dated(due, last_.from_s, std::max(due + unit, farthest_s));
   resets_ += reading.reset ? 1 : 0;
-  if (reading.anew) window_.clear(), lows_.clear(), before_ = newest_ = {}, levelled_ = false;
-  const double stamp_s = *reading.time_s, went = stamp_s - std::exchange(believed_s_, stamp_s);
-  const double off = first_ ? 0 : went - period * (number_ - believed_number_);
-  const double unsure_rate = rate_.uncertain, unsure = std::min(unsure_rate, 1.0) * std::abs(went);
-  const bool coarse = unit > 0.25 * period;
-  believed_number_ = number_, unbelieved_s_ = 0;
-  const double least_s =
-      first_ || reading.anew ? stamp_s - unit - std::abs(went) : last_.from_s + shortest(rate_) * step;
-  // One stamp may be wrong: between its neighbours it is an arrival.
-  const auto steps = [&](const ReadEnd& from, const ReadEnd& to) {
-    return shortest(rate_) * (to.last - from.last) - unit;
-  };
-  const ReadEnd now{.last = number_, .time_s = stamp_s + unit};
-  if (ReadEnd one = newest_; before_.last > 0) {
-    one.time_s = std::min(one.time_s, now.time_s - steps(one, now));
-    one.time_s = std::max(one.time_s, before_.time_s + steps(before_, one));
-    take(one.last, one.last, one.time_s);
-  }
-  before_ = std::exchange(newest_, now);
+  if (reading.anew) window_.clear(), lows_.clear(), stamped_.clear(), levelled_ = false;
+  const double stamp_s = *reading.time_s, longest = period * (1 + rate_.uncertain);
+  const double least_s = first_ || reading.anew ? stamp_s - unit - std::abs(stamp_s - believed_s_)
+                                                : last_.from_s + shortest(rate_) * step;
+  believed_s_ = stamp_s;
+  stamped_.push_back({.last = number_, .time_s = stamp_s, .gap_s = frame.time_s - stamp_s});
+  if (stamped_.size() > kReads) stamped_.pop_front();
+  take_stamp();
   if (first_) return dated(stamp_s, -kMostStampS, kMostStampS);
-  // Of a stamp and the one before, its frames earlier, one is right. Where they say two things by more than
-  // their unit, it may be as wrong as the dates before it and its arrival allow.
-  const bool fits = std::abs(off) <= unit + unsure;
-  double from_s = stamp_s - std::max(0.0, off) - unsure, to_s = stamp_s + std::max(0.0, -off) + unit + unsure;
+  // Of this stamp and the two before, their frames later, one is right. Where they say other things by more
+  // than their unit, or this one arrives later than those before, it may be as wrong as the dates before it
+  // and its arrival allow.
+  double from_s = kNever, to_s = -kNever;
+  bool fits = stamped_.size() >= kWitnesses;
+  for (std::size_t k = 1; k <= std::min(kWitnesses, stamped_.size()); ++k) {
+    const ReadEnd& one = stamped_[stamped_.size() - k];
+    const double least = one.time_s + shortest(rate_) * (number_ - one.last),
+                 most = one.time_s + longest * (number_ - one.last) + unit;
+    fits = fits && stamp_s >= least - unit && stamp_s <= most;
+    from_s = std::min(from_s, least), to_s = std::max(to_s, most);
+  }
+  const bool late = std::ranges::max_element(stamped_, {}, &ReadEnd::gap_s) == stamped_.end() - 1 &&
+                    stamps_.latest_s() - stamp_s > 0.5 * period;
   if (!fits) from_s = least_s, to_s = std::max(to_s, farthest_s);
-  if (fits && unsure_rate >= kKnown && !settings_.stored) to_s = std::max(to_s, stamps_.latest_s());
+  if (!settings_.stored && (late || rate_.uncertain >= kKnown)) to_s = std::max(to_s, stamps_.latest_s());
+  const bool coarse = unit > 0.25 * period;
   return dated(coarse ? std::clamp(due, stamp_s, stamp_s + unit) : stamp_s, from_s, to_s);
 }
 

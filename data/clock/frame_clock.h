@@ -11,19 +11,22 @@
 //
 // The assumptions:
 //   - The period is within `tolerance` of the stated one and steady to 2e-4 over a recording. Where reads
-//     are so late that single losses do not show, either the stated period is right or fewer than a tenth
-//     of the frames are lost.
+//     are so late that single losses do not show, either the stated period is right or fewer than one in
+//     seven of the frames are lost.
 //   - One read in ten is later than J, one in a hundred later than 2 J, and so on: that n reads, J apart,
 //     are all later than x has the chance 10^(-n x / J). What has a chance below 1e-13 does not happen, so
 //     one of them is late by no more than 13 J / n. J is measured on single reads and, as reads may be late
-//     together, on the earliest of each 16.
+//     together, on the earliest of each 16. Where it is longer than a period and n reads told it, what it
+//     says of 16 reads is taken 1 + 32 / n times.
 //   - A read takes all that has come. So a frame was made after the read in front of its own, but for
 //     Lateness::waited_s, which is extrapolated to 1e-13 in the same way. Behind a loss this does not hold:
 //     a buffer of the adapter or the host may have been full, and another may stand behind it.
 //   - How long frames had waited that came together in the first read is not known: their intervals have
 //     no beginning.
-//   - Of two stamps next to each other one is right. Three that go on from one another, but not from those
-//     before, show that the device has started anew.
+//   - Of three stamps next to each other one is right, and frames are a period apart at least. Three that go
+//     on from one another, but not from those before, show that the device has started anew. Live, a stamp
+//     is believed to its unit where it goes on from the two before and came no later than the last ones: one
+//     that is damaged by as much as was lost before it shows by its arrival only.
 //
 // The promise: every frame was made within its interval, up to one offset, the smallest delay of the stream.
 // No frame that arrived is counted as lost, except that FrameClock, which knows no later ones, may count
@@ -85,6 +88,7 @@ class FrameClock {
   void count_lost();
   void learn();
   FrameDate dated(double due_s, double from_s, double to_s);
+  void take_stamp();
   FrameDate by_stamp(const FrameArrival& frame);
 
   ClockSettings settings_;
@@ -95,10 +99,10 @@ class FrameClock {
   std::deque<Low> lows_;        // of window_: rising levels, the lowest in front
   std::vector<ReadEnd> ends_;   // bursts that have left it, for the rate
   std::uint64_t closed_ = 0, ended_ = 0, lost_ = 0, damaged_ = 0, resets_ = 0;
-  double number_ = 0, believed_number_ = 0, believed_s_ = 0, unbelieved_s_ = 0, arrived_s_ = 0;
+  double number_ = 0, believed_s_ = 0, arrived_s_ = 0;
   double level_s_ = 0, level_last_ = 0;
   Lateness late_;
-  ReadEnd before_, newest_;  // of the stamps
+  std::deque<ReadEnd> stamped_;  // the newest stamps
   bool first_ = true, levelled_ = false;
   FrameDate last_;
 };

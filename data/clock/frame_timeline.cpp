@@ -2,7 +2,6 @@
 #include <array>
 #include <cmath>
 #include <deque>
-#include <limits>
 #include <utility>
 
 #include "data/clock/frame_clock.h"
@@ -13,8 +12,6 @@ namespace supertac {
 using namespace clock_model;
 
 namespace {
-
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// A whole recording's envelope: for every frame the interval of its time, and what was lost before it.
 struct Tube {
@@ -31,7 +28,10 @@ class TubeMaker {
   /// too large.
   TubeMaker(std::span<const double> x, std::span<const double> y, double width_s, double period_s,
             double tolerance, std::span<const double> slack = {})
-      : x_(x), y_(y), slack_(slack), width_s_(width_s), nominal_s_(period_s), tolerance_(tolerance) {}
+      : x_(x), y_(y), slack_(slack), width_s_(width_s), nominal_s_(period_s), tolerance_(tolerance) {
+    std::vector<double> slacks(slack.begin(), slack.end());
+    if (!slacks.empty()) usual_slack_s_ = median(slacks);
+  }
 
   Tube make() {
     rate_ = stated();
@@ -66,8 +66,11 @@ class TubeMaker {
     std::vector<ReadEnd> ends = bursts_;
     for (std::size_t b = 0; b < ends.size() && b < lost_.size(); ++b)
       ends[b].time_s -= rate_.period_s * lost_[b];
-    Rate found = slope_of(ends, rate_.period_s, farthest, unit_s_);
-    found = slope_of(ends, found.period_s, farthest, unit_s_);
+    const double off_s = std::max(unit_s_, 2 * usual_slack_s_);
+    Rate found = slope_of(ends, rate_.period_s, farthest, off_s);
+    found = slope_of(ends, found.period_s, farthest, off_s);
+    if (left_s_ > 0)
+      found.uncertain = std::max(found.uncertain, 4 * left_s_ / (ends.back().time_s - ends.front().time_s));
     const double off = found.period_s / nominal_s_;
     tube_.plausible = off <= 1 + tolerance_ && off >= 1 / (1 + tolerance_);
     tube_.measured_s = found.period_s;
@@ -94,12 +97,14 @@ class TubeMaker {
     }
     late_ = lateness_of(bursts_, told_, span_s(late_.jitter_s, unit_s_));
     if (!late_.known) late_.jitter_s = late_.waited_s = std::min(kOldestS, width_s_);
+    left_s_ = 0;
     for (std::size_t b = 1; b < count; ++b) {
       const double rise = levels_[b] - levels_[b - 1];
       const bool sure = rate_.uncertain < kKnown &&
                         rise > 0.5 * rate_.period_s + grain(width_s_, rate_.period_s) &&
                         for_good(count - b, bursts_.back().time_s - bursts_[b].time_s, rise, late_.jitter_s);
       lost_[b] = lost_[b - 1] + (sure ? std::round(rise / rate_.period_s) : 0);
+      if (sure) left_s_ = std::max(left_s_, std::abs(std::remainder(rise, rate_.period_s)));
     }
   }
 
@@ -114,8 +119,6 @@ class TubeMaker {
       std::size_t begin = 0;
     };
     // Of few reads in a row one at least was not very late, of many one was hardly late.
-    std::vector<double> slacks(slack_.begin(), slack_.end());
-    const double usual_slack = slacks.empty() ? 0 : median(slacks);
     std::array<Window, 2> windows = {Window{kWitnesses, kWitnesses * late_.jitter_s},
                                      Window{kReads, span_s(late_.jitter_s, unit_s_)}};
     std::size_t b = 0, emptied = 0;  // the read of frame i; the one in front of it that took all
@@ -141,7 +144,8 @@ class TubeMaker {
       for (Window& w : windows) {
         while (w.begin + w.reads < b && burst.time_s - bursts_[w.begin + 1].time_s >= w.seconds) ++w.begin;
         if (b - w.begin < w.reads || burst.time_s - bursts_[w.begin].time_s < w.seconds) continue;
-        const double late_s = late_.jitter_s * kDecades / static_cast<double>(w.reads) + 2 * usual_slack;
+        const double late_s =
+            late_.unsure * late_.jitter_s * kDecades / static_cast<double>(w.reads) + 2 * usual_slack_s_;
         from = std::max(from,
                         levels_[w.begin] + period * x_[i] - late_s - drift * (x_[i] - bursts_[w.begin].last));
       }
@@ -162,10 +166,11 @@ class TubeMaker {
   }
 
   std::span<const double> x_, y_, slack_;
-  double width_s_, nominal_s_, tolerance_, unit_s_ = width_s_ < kNever ? width_s_ : 0;
+  double width_s_, nominal_s_, tolerance_, unit_s_ = width_s_ < kNever ? width_s_ : 0, usual_slack_s_ = 0;
   Rate rate_, told_;  // as it may be; as reads tell it, with what is lost all the time in it
   std::vector<ReadEnd> bursts_;
   std::vector<double> levels_, lost_;
+  double left_s_ = 0;  // a device that started anew was silent for so much more than whole periods
   Lateness late_;
   Tube tube_;
 };
@@ -189,45 +194,31 @@ class StampedFrames {
       if (step > 0) steps.push_back(step / count), went_s += step, frames += count;
     }
     const double period = steps.empty() ? 0 : std::min(median(steps), went_s / frames);
-    for (std::size_t k = 0; k < at_.size(); ++k)
-      out[at_[k]] = std::max({out[at_[k]], earliest(k, 1, at_[k], period), earliest(k, 2, at_[k], period)});
-    for (std::size_t k = 0; k < at_.size(); ++k)
-      if (const double most = latest(k, 1, at_[k], period) + unit_s_; stamp_s_[at_[k]] > most)
-        out[at_[k]] = std::max({most, earliest(k, 1, at_[k], period), earliest(k, 2, at_[k], period)});
-    if (at_.size() > kWitnesses) out[at_.front()] = out[at_.back()] = kUnknown;
+    for (std::size_t k = 0; k < at_.size(); ++k) {
+      std::vector<double> levels;
+      const bool inner = k >= kWitnesses - 1 && k + kWitnesses <= at_.size();
+      for (std::size_t m = k + 1 - kWitnesses; inner && m < k + kWitnesses; ++m)
+        levels.push_back(stamp_s_[at_[m]] - period * x_[at_[m]]);
+      out[at_[k]] = inner ? median(levels) + period * x_[at_[k]] : NAN;
+    }
     return out;
   }
 
-  // A stamp is right to its unit. Where one is not, any may be wrong that others do not bear out: two on one
-  // side are not both wrong.
+  // A stamp is right to its unit, or two on one side of it are not both wrong.
   void bound(Tube& tube) const {
-    const double period = tube.rate.period_s, least = shortest(tube.rate);
-    bool doubted = at_.size() < x_.size();
-    for (std::size_t k = 0; k < at_.size(); ++k) {
-      const double stamp_s = stamp_s_[at_[k]],
-                   over_s = k == 0 ? 0 : stamp_s - unit_s_ - earliest(k, 1, at_[k], 0);
-      const double frames = k == 0 ? 0 : x_[at_[k]] - x_[at_[k - 1]],
-                   left_s = over_s - period * std::max(frames, std::round(over_s / period));
-      doubted = doubted || stamp_s < earliest(k, 1, at_[k], least) ||
-                stamp_s - unit_s_ > latest(k, 1, at_[k], least) ||
-                std::abs(left_s) > unit_s_ + (period - least) * std::max(frames, over_s / period);
-    }
-    std::size_t k = 0;
-    for (std::size_t i = 0; i < x_.size(); ++i) {
+    const double period = tube.rate.period_s, least = shortest(tube.rate), unsure = 2 * (period - least);
+    for (std::size_t i = 0, k = 0; i < x_.size(); ++i) {
       const bool stamped = k < at_.size() && at_[k] == i;
-      double from = kNever, to = -kNever;
-      if (stamped)
-        from = stamp_s_[i] - unit_s_ - 2 * (period - least), to = stamp_s_[i] + 2 * (period - least);
       const std::size_t behind = k + (stamped ? 0 : -1);
-      if (stamped)
-        tube.dates[i] = unit_s_ <= 0.25 * period
-                            ? stamp_s_[i] - unit_s_
-                            : std::clamp(tube.dates[i], stamp_s_[i] - unit_s_, stamp_s_[i]);
-      if (doubted || k == 0 || k + 1 >= at_.size())
-        from = std::min({from, earliest(k, 1, i, least), earliest(k, 2, i, least)}),
-        to = std::max({to, latest(behind, 1, i, least), latest(behind, 2, i, least)});
-      tube.from[i] = from, tube.to[i] = to;
-      tube.dates[i] = std::clamp(tube.dates[i], from, to);
+      double &from = tube.from[i], &to = tube.to[i], &date = tube.dates[i];
+      from = std::min(earliest(k, 1, i, least), earliest(k, 2, i, least));
+      to = std::max(latest(behind, 1, i, least), latest(behind, 2, i, least));
+      if (stamped) {
+        const double stamp_s = stamp_s_[i], begin_s = stamp_s - unit_s_;
+        from = std::min(from, begin_s - unsure), to = std::max(to, stamp_s + unsure);
+        date = unit_s_ <= 0.25 * period ? begin_s : std::clamp(date, begin_s, stamp_s);
+      }
+      date = std::clamp(date, from, to);
       k += stamped;
     }
   }
@@ -256,24 +247,32 @@ struct ReadStamps {
 
 ReadStamps read_stamps(const ClockSettings& settings, std::span<const FrameArrival> arrivals, double unit_s) {
   ReadStamps out;
-  out.time_s.assign(arrivals.size(), kUnknown);
+  out.time_s.assign(arrivals.size(), NAN);
   DeviceStamps stamps(settings);
   std::vector<std::size_t> at;
+  double ahead_s = 0;  // as wrong as the first stamps were
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < arrivals.size(); ++i)
+    if (arrivals[i].stamp_s && arrivals[i - 1].stamp_s)
+      steps.push_back((*arrivals[i].stamp_s - *arrivals[i - 1].stamp_s) / (1 + arrivals[i].damaged));
+  const Rate rate{steps.empty() ? settings.period_s : median(steps), 0.5};
   for (std::size_t i = 0; i < arrivals.size(); ++i) {
     if (unit_s <= 0 || !arrivals[i].stamp_s) continue;
     const double elapsed_s = at.empty() ? 0 : arrivals[i].time_s - arrivals[at.back()].time_s;
-    const DeviceStamps::Reading reading = stamps.read(*arrivals[i].stamp_s, elapsed_s, settings.period_s);
+    const DeviceStamps::Reading reading = stamps.read(*arrivals[i].stamp_s, elapsed_s, rate);
     at.push_back(i);
     std::size_t begin = i;
     for (const DeviceStamps::Revision& one : reading.revised) {
       const std::size_t k = at[at.size() - 1 - one.back];
-      out.time_s[k] = one.time_s ? *one.time_s + unit_s : kUnknown;
+      out.time_s[k] = one.time_s ? *one.time_s - ahead_s + unit_s : NAN;
       if (one.time_s) begin = k;
     }
     if (reading.reset) out.begins.push_back(begin);
-    if (reading.anew && !reading.reset)
-      std::fill_n(out.time_s.begin(), static_cast<std::ptrdiff_t>(begin), kUnknown);
-    if (reading.time_s) out.time_s[i] = *reading.time_s + unit_s;
+    if (reading.time_s) out.time_s[i] = *reading.time_s - ahead_s + unit_s;
+    if (!reading.anew || reading.reset) continue;
+    const double more_s = out.time_s[begin] - unit_s - *arrivals[begin].stamp_s;
+    ahead_s += more_s;
+    for (std::size_t k = 0; k <= i; ++k) out.time_s[k] = k < begin ? NAN : out.time_s[k] - more_s;
   }
   out.begins.push_back(arrivals.size());
   return out;
@@ -289,8 +288,8 @@ Rate to_port(std::span<const double> arrived_s, double unit_s, Tube& tube) {
   std::vector<double> sorted = slack;
   const double most_s = 2 * median(sorted);
   for (std::size_t i = 0; i < count; ++i)
-    if (slack[i] > most_s || (count > kWitnesses && (i == 0 || i + 1 == count))) witness[i] = kUnknown;
-  const Tube port = TubeMaker(tube.dates, witness, kNever, 1, kClockOff, slack).make();
+    if (slack[i] > most_s || (count > kWitnesses && (i == 0 || i + 1 == count))) witness[i] = NAN;
+  const Tube port = TubeMaker(tube.dates, witness, kNever, 1, 0.5, slack).make();
   for (std::size_t i = 0; i < count; ++i) {
     const double before_s = tube.dates[i] - tube.from[i], after_s = tube.to[i] - tube.dates[i];
     tube.from[i] = port.from[i] - (1 + kClockDrifts) * before_s - unit_s;
