@@ -25,13 +25,12 @@ void FeltTaxels::add(const Recording& recording) {
 }
 
 std::vector<int> FeltTaxels::unfelt() const {
-  constexpr float kShare = 0.1F;
   std::vector<int> taxels;
   const auto channels = static_cast<std::size_t>(array_.channels);
   for (std::size_t k = 0; k < low_.size() / channels; ++k) {
     float most = 0;
     for (std::size_t s = k * channels; s < (k + 1) * channels; ++s) most = std::max(most, high_[s] - low_[s]);
-    if (most < kShare * static_cast<float>(span_)) taxels.push_back(static_cast<int>(k));
+    if (most < 0.1F * static_cast<float>(span_)) taxels.push_back(static_cast<int>(k));
   }
   return taxels;
 }

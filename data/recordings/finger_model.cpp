@@ -15,13 +15,9 @@ namespace {
 // Taxel gains of the rig: geometric means over fits to its recordings. Of another array nothing is known.
 constexpr double kGain[kTaxels] = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20, 0.60,
                                    0.27, 0.55, 0.20, 0.65, 0.50, 0.40, 0.10, 0.80};
-constexpr double kUnknownGain = 0.5;
-constexpr double kRestSpreadVolts = 0.003;
 // Of three axes: how far below rest those along the plate are where nothing leans, and the skin that is
 // dragged.
 constexpr double kMiddleVolts = (rig::kRestVolts - rig::kFloorVolts) / 2, kFriction = 0.3;
-constexpr std::uint64_t kThresholds = 2000;   // numbers of a mounting that nothing else has taken
-constexpr double kLeastIndentationMm = -1.8;  // of 2.5 mm of texture the finger then still touches the top
 
 // Points of the pad. Along the slide they are as fine as the tip of a ridge; across it little changes.
 constexpr double kAcrossMm = 2, kAlongMm = 0.25;
@@ -35,11 +31,10 @@ int points_across(const TaxelArray& a) {
   return points_of(a.columns, a.pitch_mm.x, kBeyondAcrossMm, kAcrossMm);
 }
 int points_along(const TaxelArray& a) { return points_of(a.rows, a.pitch_mm.y, kBeyondAlongMm, kAlongMm); }
-constexpr double kNoPadSigmaMm = 0.3;  // without a pad a taxel feels the points next to it
 
 // Grid of the plate's surface: wide enough for the rig's whole pad with its centre on the plate; beyond it
 // everything is as at its edge.
-constexpr double kCellMm = 0.25, kMarginMm = 12, kBesideMm = -3;
+constexpr double kCellMm = 0.25, kMarginMm = 12;
 constexpr int kColumns = static_cast<int>((Plate::kWidthMm + 2 * kMarginMm) / kCellMm) + 1;
 constexpr int kRows = static_cast<int>((Plate::kLengthMm + 2 * kMarginMm) / kCellMm) + 1;
 
@@ -49,7 +44,7 @@ struct Term {
 };
 constexpr Term kTerms[] = {
     {"mount", [](SimulatorSettings& s) { s.with_mount = false; }},
-    {"pad", [](SimulatorSettings& s) { s.body.skin_mm = 2 * kNoPadSigmaMm; }},
+    {"pad", [](SimulatorSettings& s) { s.body.skin_mm = 0.6; }},
     {"dome", [](SimulatorSettings& s) { s.body.shape = BodyShape::flat, s.body.radius_mm = 0; }},
     {"edges", [](SimulatorSettings& s) { s.with_edges = false; }},
     {"tilt", [](SimulatorSettings& s) { s.tilt_spread = 0; }},
@@ -143,14 +138,14 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
   const std::uint64_t drifts = 100 * (1 + taxels / 100);  // numbers that no gain has taken
   for (std::uint64_t c = 0; c < taxels; ++c) {
     const double own = factor(spread * trial.normal(c)) * factor(spread / 3 * pass.normal(c));
-    gain_.push_back((settings.with_gains && rig ? kGain[c] : kUnknownGain) * own * common_gain);
-    threshold_.push_back(settings.threshold_mm * std::abs(trial.normal(kThresholds + c)));
-    rest_.push_back(rig::kRestVolts + variation * kRestSpreadVolts * sensor.normal(c));
+    gain_.push_back((settings.with_gains && rig ? kGain[c] : 0.5) * own * common_gain);
+    threshold_.push_back(settings.threshold_mm * std::abs(trial.normal(2000 + c)));
+    rest_.push_back(rig::kRestVolts + variation * 0.003 * sensor.normal(c));
     drift_.push_back(settings.drift_volts_per_s * pass.normal(drifts + c));
   }
   const double press = trial.normal(1003) + pass.normal(1003);
   const double indentation = settings.indentation_mm + variation * settings.indentation_spread_mm * press;
-  indentation_mm_ = std::max(kLeastIndentationMm, indentation);
+  indentation_mm_ = std::max(-1.8, indentation);  // it still touches the top of 2.5 mm of texture
   vibration_phase_ = pass.uniform(1004);
   emi_phase_ = pass.uniform(1005);
 
@@ -160,7 +155,7 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
       const double x = c * kCellMm - kMarginMm, y = r * kCellMm - kMarginMm;
       const bool beside = x < 0 || x > Plate::kWidthMm || y < 0 || y > Plate::kLengthMm;
       map_[static_cast<std::size_t>(r * kColumns + c)] =
-          beside && settings.with_edges ? kBesideMm : plate.height(x, y);
+          beside && settings.with_edges ? -3 : plate.height(x, y);
     }
   shape_pad(slope_x, slope_y);
 }

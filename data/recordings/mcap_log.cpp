@@ -7,8 +7,6 @@
 namespace supertac {
 namespace {
 
-constexpr char kFrame[] = "supertac";  // of coordinates, in a ROS header
-
 // The definitions of ROS 2's common interfaces, without their comments.
 constexpr char kImage[] = R"(std_msgs/Header header
 uint32 height
@@ -70,8 +68,7 @@ class Cdr {
 };
 
 std::uint64_t nanoseconds(double seconds) {
-  constexpr double kMost = 9e18;
-  return static_cast<std::uint64_t>(std::clamp(std::round(1e9 * seconds), 0.0, kMost));
+  return static_cast<std::uint64_t>(std::clamp(std::round(1e9 * seconds), 0.0, 9e18));
 }
 
 std::string image_message(std::uint64_t stamp, int height, int width, int channels,
@@ -82,7 +79,7 @@ std::string image_message(std::uint64_t stamp, int height, int width, int channe
   return Cdr()
       .number(stamp / kSecond)
       .number(stamp % kSecond)
-      .text(kFrame)
+      .text("supertac")  // the frame of coordinates
       .number(static_cast<std::size_t>(height))
       .number(static_cast<std::size_t>(width))
       .text(encoding)

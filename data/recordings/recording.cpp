@@ -21,7 +21,6 @@
 namespace supertac {
 namespace {
 
-constexpr char kKind[] = "recording";
 // What no rig does; a model file has the same limit for its filter.
 constexpr double kFastest = 1e4, kLongestFilter = 10, kLongest = 1e10;
 constexpr int kMostTruthPixels = 1024;
@@ -149,7 +148,7 @@ Recording recording_of(const SafetensorsFile& file) {
   recording.metadata = file.metadata();
   recording.metadata.erase(kProvenanceKey);
   const std::string kind = take(recording.metadata, path, "kind");
-  if (kind != kKind) throw FileError(path, "is a " + in_quotes(kind) + ", expected a recording");
+  if (kind != "recording") throw FileError(path, "is a " + in_quotes(kind) + ", expected a recording");
   recording.plate = take(recording.metadata, path, "plate");
   recording.trial = take_count(recording.metadata, path, "trial");
   recording.pass = take_count(recording.metadata, path, "pass");
@@ -256,7 +255,7 @@ std::map<std::string, std::string> metadata_of(const Recording& recording) {
                                   " is a member of the recording; set it there");
     }
   }
-  metadata["kind"] = kKind;
+  metadata["kind"] = "recording";
   metadata["plate"] = recording.plate;
   metadata["trial"] = std::to_string(recording.trial);
   metadata["pass"] = std::to_string(recording.pass);

@@ -2,15 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
 #include <stdexcept>
 #include <string>
 
 namespace supertac {
 namespace {
-
-constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
 bool finite(std::span<const float> signals) {
   return std::all_of(signals.begin(), signals.end(), [](float v) { return std::isfinite(v); });
@@ -91,7 +88,7 @@ class Segment {
     const bool next = before + 1 < usable_.size() && time(before + 1) - at < at - time(before);
     track.recorded.push_back(static_cast<std::uint32_t>(usable_[before + (next ? 1 : 0)]));
     if (recording_.position_mm.empty()) {
-      track.position_mm.insert(track.position_mm.end(), 2, kUnknown);
+      track.position_mm.insert(track.position_mm.end(), 2, NAN);
       track.lift_mm.push_back(0);
       return;
     }

@@ -9,26 +9,22 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kMostValues = std::size_t{1} << 22, kLeastFrames = 16, kFarthest = 64;
-constexpr double kTail = 0.005, kMostClipped = 0.05, kLeastFilled = 0.1, kMargin = 1.1;
+constexpr double kTail = 0.005;
 // The rest of some taxels lies above the common one.
-constexpr double kAboveRest = 0.25;
 
 }  // namespace
 
 std::string contradiction(std::span<const float> signals, const SignalScale& scale) {
-  constexpr double kMostOutside = 0.5, kMargin = 0.25, kShare = 0.01, kFarWider = 10;
   if (signals.empty()) return {};
-  const double low = scale.low(), high = scale.high(), margin = kMargin * (high - low);
+  const double low = scale.low(), high = scale.high(), margin = 0.25 * (high - low);
   const auto outside =
       std::ranges::count_if(signals, [&](double v) { return v < low - margin || v > high + margin; });
   const auto [least, most] = std::ranges::minmax(signals);
   const auto whole = [](float v) { return v == std::round(v); };
   // At rest a sensor of counts may stay at 0 and 1 as well.
-  const bool shares = least >= -kShare && most <= 1 + kShare && most - least > 0.5F &&
-                      high - low >= kFarWider && !std::ranges::all_of(signals, whole);
-  if (static_cast<double>(outside) <= kMostOutside * static_cast<double>(signals.size()) && !shares)
-    return {};
+  const bool shares = least >= -0.01 && most <= 1.01 && most - least > 0.5F && high - low >= 10 &&
+                      !std::ranges::all_of(signals, whole);
+  if (static_cast<double>(outside) <= 0.5 * static_cast<double>(signals.size()) && !shares) return {};
   return "from " + format(least) + " to " + format(most) + ", the sensor's range is " + format(low) + " to " +
          format(high) + " " + scale.unit;
 }
@@ -55,7 +51,7 @@ void SignalRange::add(const Recording& recording) {
   felt_.add(recording);
   if (values_.empty()) stated_ = {.rest = recording.signal_scale.rest, .span = recording.signal_scale.span};
   const std::size_t signals = recording.array.signals(), frames = recording.frames();
-  const std::size_t apart = factor_ * std::clamp(frames / kLeastFrames, std::size_t{1}, kFarthest);
+  const std::size_t apart = factor_ * std::clamp(frames / 16, std::size_t{1}, std::size_t{64});
   for (; next_ < frames; next_ += apart)
     for (std::size_t k = 0; k < signals; ++k) {
       const float value = recording.signals[next_ * signals + k];
@@ -63,7 +59,7 @@ void SignalRange::add(const Recording& recording) {
     }
   sorted_ = false;
   next_ = factor_ > 1 ? next_ - frames : 0;
-  while (values_.size() > kMostValues) thin_out();
+  while (values_.size() > (1 << 22)) thin_out();
 }
 
 // Every second of the sorted values: the levels stay where they are.
@@ -83,7 +79,7 @@ const std::vector<float>& SignalRange::values() const {
 double SignalRange::clipped(const Scaling& s) const {
   if (values_.empty()) return 0;
   const std::vector<float>& sorted = values();
-  const double pressed = s.rest - s.span, beyond_rest = s.rest + kAboveRest * s.span;
+  const double pressed = s.rest - s.span, beyond_rest = s.rest + 0.25 * s.span;
   const auto below = std::ranges::lower_bound(sorted, std::min(pressed, beyond_rest)) - sorted.begin();
   const auto above = sorted.end() - std::ranges::upper_bound(sorted, std::max(pressed, beyond_rest));
   return static_cast<double>(below + above) / static_cast<double>(sorted.size());
@@ -96,8 +92,8 @@ double SignalRange::level(double share) const {
 Scaling SignalRange::fitted() const {
   if (values_.empty()) return stated_;
   const double low = level(kTail), high = level(1 - kTail);
-  if (clipped(stated_) <= kMostClipped && high - low >= kLeastFilled * std::abs(stated_.span)) return stated_;
-  const double span = std::max(kMargin * (high - low), 1e-6);
+  if (clipped(stated_) <= 0.05 && high - low >= 0.1 * std::abs(stated_.span)) return stated_;
+  const double span = std::max(1.1 * (high - low), 1e-6);
   if (stated_.span < 0) return {.rest = low, .span = -span};
   return {.rest = high, .span = span};
 }

@@ -32,12 +32,10 @@ FingerPose pose_at(double t, const PassSettings& pass) {
 // Smooth noise along the slide: normal numbers `step` apart and smooth steps between them, octave by octave
 // half as far and of half the variance.
 double rocking(const RandomStream& random, double y_mm) {
-  constexpr std::uint64_t kOctaves = 6, kKnots = 1000;  // numbers of an octave
-  constexpr double kWidestMm = 40, kWeight = 0.7, kBeforePlateMm = 100;
-  double sum = 0, step = kWidestMm, weight = kWeight;
-  for (std::uint64_t octave = 0; octave < kOctaves; ++octave, step /= 2, weight *= std::numbers::sqrt2 / 2) {
-    const double at = (y_mm + kBeforePlateMm) / step, knot = std::floor(at), f = at - knot;
-    const std::uint64_t number = octave * kKnots + static_cast<std::uint64_t>(knot);
+  double sum = 0, step = 40, weight = 0.7;  // mm of the widest, and its share
+  for (std::uint64_t octave = 0; octave < 6; ++octave, step /= 2, weight *= std::numbers::sqrt2 / 2) {
+    const double at = (y_mm + 100) / step, knot = std::floor(at), f = at - knot;
+    const std::uint64_t number = 1000 * octave + static_cast<std::uint64_t>(knot);
     sum += weight * std::lerp(random.normal(number), random.normal(number + 1), f * f * (3 - 2 * f));
   }
   return sum;
@@ -52,11 +50,10 @@ class Wander {
         along_(seed, kStream + stream + 1),
         height_(seed, kStream + stream + 2) {}
   void apply(FingerPose& pose) const {
-    constexpr double kHeightMm = 4;  // per unit of slope
     if (strength_ <= 0) return;
     pose.slope_x += strength_ * rocking(across_, pose.y_mm);
     pose.slope_y += strength_ * rocking(along_, pose.y_mm);
-    pose.z_mm += strength_ * kHeightMm * rocking(height_, pose.y_mm);
+    pose.z_mm += 4 * strength_ * rocking(height_, pose.y_mm);
   }
 
  private:

@@ -9,7 +9,6 @@ namespace supertac {
 
 std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, double seconds,
                           const std::function<bool()>& stop) {
-  constexpr std::size_t kMostBytes = std::size_t{16} << 20;
   constexpr double kWaitS = 0.05;
   std::vector<Heard> heard;
   std::vector<std::byte> buffer(65536);
@@ -17,7 +16,7 @@ std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, dou
   // A machine that stands still listens to nothing: of each wait no more counts than was asked for.
   double now = opened.port->now(), listened = 0;
   try {
-    while (!stop() && listened < seconds && bytes < kMostBytes) {
+    while (!stop() && listened < seconds && bytes < (16 << 20)) {
       const Received got = opened.port->read(buffer, now + kWaitS);
       const double before = std::exchange(now, opened.port->now());
       listened += std::min(now - before, kWaitS);

@@ -12,8 +12,7 @@
 namespace supertac {
 namespace {
 
-constexpr double kReadSlice = 0.05, kSilenceS = 3, kSilentPeriods = 10, kRigSilenceS = 1;
-constexpr std::size_t kReadBytes = 65536;  // no datagram is longer, and a terminal holds a sixteenth
+constexpr double kReadSlice = 0.05;
 constexpr std::size_t kShown = 120;
 
 bool is_rig(const Sensor& sensor) { return sensor.frame.kind == FrameKind::board; }
@@ -27,7 +26,7 @@ FrameReader::FrameReader(const Sensor& sensor, bool stored)
       rest_(sensor) {}
 
 std::span<const ReadFrame> FrameReader::read(Port& port, double until, double& time_s) {
-  std::array<std::byte, kReadBytes> buffer;
+  std::array<std::byte, 65536> buffer;  // no datagram is longer, and a terminal holds a sixteenth
   const Received got = port.read(buffer, until);
   const auto bytes = std::span(buffer).first(got.count);
   if (without_frame_.size() < kShown)
@@ -127,7 +126,7 @@ void SensorReader::run() {
 }
 
 double SensorReader::silence_s(const Sensor& sensor) {
-  return is_rig(sensor) ? kRigSilenceS : std::max(kSilenceS, kSilentPeriods / sensor.rate_hz);
+  return is_rig(sensor) ? 1 : std::max(3.0, 10 / sensor.rate_hz);
 }
 
 void SensorReader::check_silence(double time_s) {
@@ -166,15 +165,15 @@ void SensorReader::check_silence(double time_s) {
 // A single jump says nothing: old frames may have waited, or a clock may just have been set. Frames that come
 // faster than they were made are a log that somebody sends.
 void SensorReader::check_clock(double stamp_s, double arrival_s) {
-  constexpr double kLongEnoughS = 1, kMostOff = 300, kMostHaste = 3;
+  constexpr double kMostOff = 300;
   if (checked_frames_++ == 0) checked_time_s_ = stamp_s, first_arrival_s_ = arrival_s;
   const double step_s = std::abs(stamp_s - std::exchange(checked_time_s_, stamp_s));
   longest_step_s_ = std::max(longest_step_s_, step_s), went_s_ += step_s;
   const double elapsed = arrival_s - first_arrival_s_;
-  if (elapsed < kLongEnoughS || checked_frames_ < 5) return;
+  if (elapsed < 1 || checked_frames_ < 5) return;
   clock_checked_ = true;
   const double ratio = went_s_ / elapsed, steady = ratio - longest_step_s_ / elapsed;
-  const bool log = static_cast<double>(checked_frames_) / elapsed > kMostHaste * sensor_.rate_hz;
+  const bool log = static_cast<double>(checked_frames_) / elapsed > 3 * sensor_.rate_hz;
   if (log || (steady < kMostOff && ratio > 1 / kMostOff)) return;
   throw WrongDevice("sensor " + sensor_.name + " at " + port_->name() + ": its time stamps go " +
                     format(ratio, ratio < 1 ? 6 : 0) +

@@ -16,10 +16,8 @@ CollectedFrames frames_in(const Journal& journal, const Sensor& sensor) {
   const std::size_t signals = sensor.array.signals();
   const bool rig = sensor.frame.kind == FrameKind::board;
   // A damaged header may name an array of a few taxels and thousands of places without one.
-  constexpr std::uint64_t kMostGrowth = 64, kAlways = 1 << 24;
-  std::uint64_t most_bytes = kAlways;
-  for (const JournalRecord& record : journal.of(Stream::board))
-    most_bytes += kMostGrowth * record.bytes.size();
+  std::uint64_t most_bytes = 1 << 24;
+  for (const JournalRecord& record : journal.of(Stream::board)) most_bytes += 64 * record.bytes.size();
   std::uint32_t skipped = 0;
   for (const JournalRecord& record : journal.of(Stream::board)) {
     if (record.kind != RecordKind::received) continue;
@@ -29,7 +27,7 @@ CollectedFrames frames_in(const Journal& journal, const Sensor& sensor) {
       const std::size_t before = all.signals.size();
       if (sizeof(float) * before > most_bytes)
         throw JournalError("journal: its sensor, " + sensor.array.text() + ", makes frames of over " +
-                           std::to_string(kMostGrowth) + " times what was received; is its header damaged?");
+                           "64 times what was received; is its header damaged?");
       all.signals.resize(before + signals);
       const auto arranged = std::span(all.signals).subspan(before);
       sensor.arrange(frame.values, arranged);

@@ -103,7 +103,6 @@ std::string doubt_of(const FrameTimeline& clock, const PositionTrack& track) {
 
 CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const PositionTrack& track,
                       double speed) {
-  constexpr double kLeastKept = 0.75;
   CollectedPass pass;
   std::uint64_t before = 0, last = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -128,7 +127,7 @@ CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const Pos
   pass.doubt = doubt_of(all.clock, track);
   pass.missing = last - before;
   const std::uint64_t kept = pass.time_s.size(), made = kept + pass.left_out + pass.missing;
-  if (static_cast<double>(kept) < kLeastKept * static_cast<double>(made))
+  if (static_cast<double>(kept) < 0.75 * static_cast<double>(made))
     pass.doubt += "only " + std::to_string(kept) + " of " + std::to_string(made) + " frames were kept; ";
   pass.doubt.resize(pass.doubt.size() - std::min<std::size_t>(2, pass.doubt.size()));
   return pass;
@@ -165,8 +164,7 @@ std::string event_text(const PositionSample& sample) {
 }
 
 double named_speed(double measured, double ordered) {
-  constexpr double kAsOrdered = 0.005;
-  if (!(measured > 0 && ordered > 0) || std::abs(measured / ordered - 1) < kAsOrdered) return ordered;
+  if (!(measured > 0 && ordered > 0) || std::abs(measured / ordered - 1) < 0.005) return ordered;
   const double digit = std::pow(10, std::floor(std::log10(measured)) - 2);
   return digit * std::round(measured / digit);
 }

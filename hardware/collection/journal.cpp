@@ -18,15 +18,11 @@
 namespace supertac {
 namespace {
 
-constexpr std::uint32_t kMagic = 0x314A5453;                  // "STJ1"
-constexpr std::size_t kChunkHeader = 24;                      // magic, stream, length, CRC-32, time
-constexpr std::size_t kRecordHeader = 13;                     // kind, time, length
-constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 36;  // of a journal: four days
-constexpr std::size_t kMostPayload = 2048;                    // of a chunk of several records
-constexpr std::size_t kMostPending = 64 << 20;
-constexpr double kFlushAfter = 0.1;   // of recorded time, and of the wall's
-constexpr double kLatestTime = 1e10;  // s: 300 years, so that no arithmetic on times can overflow
-constexpr auto kSyncEvery = std::chrono::seconds(1);
+constexpr std::uint32_t kMagic = 0x314A5453;  // "STJ1"
+constexpr std::size_t kChunkHeader = 24;      // magic, stream, length, CRC-32, time
+constexpr std::size_t kRecordHeader = 13;     // kind, time, length
+constexpr double kFlushAfter = 0.1;           // of recorded time, and of the wall's
+constexpr double kLatestTime = 1e10;          // s: 300 years, so that no arithmetic on times can overflow
 
 template <class T>
 void put(std::vector<std::byte>& out, T value) {
@@ -66,8 +62,7 @@ std::vector<std::span<const std::byte>> parts_of(std::span<const std::byte> payl
   std::vector<std::span<const std::byte>> parts;
   for (std::size_t size = 0; !payload.empty(); size = 0) {
     do size += kRecordHeader + get<std::uint32_t>(payload, size + 9);
-    while (size < payload.size() &&
-           size + kRecordHeader + get<std::uint32_t>(payload, size + 9) <= kMostPayload);
+    while (size < payload.size() && size + kRecordHeader + get<std::uint32_t>(payload, size + 9) <= 2048);
     parts.push_back(payload.first(size));
     payload = payload.subspan(size);
   }
@@ -108,7 +103,7 @@ JournalWriter::~JournalWriter() {
 
 void JournalWriter::append(Stream stream, RecordKind kind, double time_s, std::span<const std::byte> bytes) {
   std::lock_guard lock(mutex_);
-  if (pending_bytes_ > kMostPending) {
+  if (pending_bytes_ > (64 << 20)) {
     if (error_.empty()) error_ = "journal " + path_ + ": the disk is too slow, 64 MB wait to be written";
     return;
   }
@@ -156,7 +151,7 @@ void JournalWriter::run_sync() {
   for (;;) {
     {
       std::unique_lock lock(mutex_);
-      if (stopping_.wait_for(lock, kSyncEvery, [&] { return stop_; })) return;
+      if (stopping_.wait_for(lock, std::chrono::seconds(1), [&] { return stop_; })) return;
     }
     sync();
   }
@@ -311,6 +306,8 @@ Journal parse_journal(std::span<const std::byte> bytes, const std::string& name)
   return journal;
 }
 
-Journal read_journal(const std::string& path) { return parse_journal(read_file(path, kMostBytes), path); }
+Journal read_journal(const std::string& path) {
+  return parse_journal(read_file(path, std::uint64_t{1} << 36), path);
+}
 
 }  // namespace supertac

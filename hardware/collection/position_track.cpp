@@ -10,13 +10,9 @@
 namespace supertac {
 namespace {
 
-constexpr int kMostSteps = 20'000;  // of a modelled leg: 100 s every 5 ms
-constexpr double kOffLeg = 0.05;    // mm, beside the leg's line, by rounding
-constexpr double kRounding = 0.01;  // mm, of two positions
+constexpr double kOffLeg = 0.05;  // mm, beside the leg's line, by rounding
 // More than so many samples that do not fit are not noise: a cable that damages 0.2 % of the bytes spoils 3
 // %.
-constexpr double kMostMisfits = 0.1;
-constexpr double kEven = 0.01;  // of the speed
 
 // How far along the leg's straight line the sample is, and how far from it, ends included.
 struct OnLeg {
@@ -58,10 +54,9 @@ std::vector<std::pair<double, double>> cruise_of(const Leg& leg, const std::vect
 // The median over pairs of samples some way apart: neither damaged samples nor a machine that stood still for
 // a while move it, and no order takes part in it. 0 of too few.
 double speed_of(std::span<const std::pair<double, double>> places) {
-  constexpr std::size_t kFewest = 8;
   const std::size_t apart = std::max<std::size_t>(1, places.size() / 8);
   std::vector<double> speeds;
-  for (std::size_t i = 0; places.size() >= kFewest && i + apart < places.size(); ++i) {
+  for (std::size_t i = 0; places.size() >= 8 && i + apart < places.size(); ++i) {
     const double seconds = places[i + apart].first - places[i].first;
     if (seconds > 0) speeds.push_back((places[i + apart].second - places[i].second) / seconds);
   }
@@ -83,7 +78,6 @@ double unevenness_of(std::span<const std::pair<double, double>> places) {
 // sake: what nothing else can be reached from stands alone.
 std::vector<PositionSample> chain_of(const Leg& leg, double fastest,
                                      const std::vector<PositionSample>& samples) {
-  constexpr std::size_t kLookBack = 64;
   std::vector<PositionSample> good = {{leg.sent_s, 0, leg.from}};
   for (const PositionSample& sample : samples)
     if (on_leg(leg, sample.position).off < kOffLeg) good.push_back(sample);
@@ -99,7 +93,7 @@ std::vector<PositionSample> chain_of(const Leg& leg, double fastest,
     const auto extend = [&](std::size_t j) {
       if (length[j] > 0 && length[j] + 1 > length[i] && follows(j, i)) length[i] = length[j] + 1, from[i] = j;
     };
-    for (std::size_t j = i > kLookBack ? i - kLookBack : 0; j < i; ++j) extend(j);
+    for (std::size_t j = i > 64 ? i - 64 : 0; j < i; ++j) extend(j);
     extend(0);
     if (length[i] >= length[best]) best = i;
   }
@@ -125,8 +119,7 @@ std::vector<double> beyond(std::span<const Leg> legs, const Taken& taken) {
 }  // namespace
 
 MoveTiming timing_of(std::span<const Leg> ended) {
-  constexpr std::size_t kEnough = 4, kSlides = 3;
-  constexpr double kMostSlowness = 0.02, kFastestRamp = 1e5, kSlowestRamp = 20;
+  constexpr std::size_t kEnough = 4;
   MoveTiming timing;
   double speed = 0, slow = 0;
   for (const Leg& leg : ended) speed = leg.phase == Phase::slide ? leg.speed : speed;
@@ -155,15 +148,15 @@ MoveTiming timing_of(std::span<const Leg> ended) {
     timing.range_s = ramps;
   }
   timing.delay_s = fast_beyond - ramps;
-  timing.acceleration = std::clamp(speed / std::max(ramps, 1e-9), kSlowestRamp, kFastestRamp);
+  timing.acceleration = std::clamp(speed / std::max(ramps, 1e-9), 20.0, 1e5);  // mm/s^2
   timing.spread_s = std::max(spread(fast_s), spread(slow_s));
   std::vector<double> slides;
   for (const Leg& leg : ended)
     if (leg.phase == Phase::slide && leg.speed > 0)
       slides.push_back((took(leg) - timing.delay_s - leg.speed / timing.acceleration) / ordered_s(leg));
-  if (slides.size() < kSlides) return timing;
+  if (slides.size() < 3) return timing;
   const double slowness = median(slides);
-  if (std::abs(slowness - 1) < kMostSlowness) timing.slowness = slowness;
+  if (std::abs(slowness - 1) < 0.02) timing.slowness = slowness;
   return timing;
 }
 
@@ -185,7 +178,7 @@ void PositionTrack::distrust(double fastest, const PositionSample& before, const
                       : reachable(fastest, before, after) ? way - farthest
                                                           : way;
   const double when_s = 0.5 * std::max(before.round_trip_s, after.round_trip_s);
-  doubt_mm_ = std::max(doubt_mm_, away + when_s * fastest + kRounding);
+  doubt_mm_ = std::max(doubt_mm_, away + when_s * fastest + 0.01);  // mm: both are rounded
 }
 
 void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
@@ -202,7 +195,7 @@ void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
   if (leg.phase == Phase::slide && cruise_s > 0) speed_ = as_ordered ? leg.speed : length / cruise_s;
   const double start = std::min(std::max(leg.accepted_s + timing.delay_s, leg.sent_s), leg.ended_s - 1e-6);
   const double duration = leg.ended_s - start;
-  const int steps = static_cast<int>(std::clamp(duration / 0.005, 1.0, double{kMostSteps}));
+  const int steps = static_cast<int>(std::clamp(duration / 0.005, 1.0, 2e4));  // every 5 ms, for 100 s
   for (int i = 0; i <= steps; ++i) {
     const double t = duration * i / steps;
     const double part =
@@ -213,14 +206,13 @@ void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
 
 void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& samples,
                             const MoveTiming& timing) {
-  constexpr std::size_t kFewest = 20;
   add(leg.sent_s, leg.from);
   if (samples.empty() && leg.ended_s > 0) return model(leg, timing);
   const std::vector<PositionSample> prompt = on_time(samples);
   const double fitted = speed_of(cruise_of(leg, prompt)), fastest = timing.faster * leg.speed;
   const std::vector<PositionSample> chain = chain_of(leg, fastest, prompt);
   rejected_ += samples.size() - chain.size();
-  if (prompt.size() >= kFewest)
+  if (prompt.size() >= 20)
     misfits_ = std::max(misfits_, 1 - static_cast<double>(chain.size()) / static_cast<double>(prompt.size()));
   if (leg.phase == Phase::slide) speed_ = fitted, unevenness_ = unevenness_of(cruise_of(leg, chain));
   PositionSample before{leg.sent_s, 0, leg.from};
@@ -238,8 +230,8 @@ void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& s
 std::string PositionTrack::doubt(double trusted_mm) const {
   std::string doubt;
   if (doubt_mm_ > trusted_mm) doubt += "the head may have been " + format(doubt_mm_, 1) + " mm elsewhere; ";
-  if (misfits_ > kMostMisfits) doubt += format(100 * misfits_, 0) + " % of its positions fit no way; ";
-  if (unevenness_ > kEven) doubt += "its speed was not even (" + format(100 * unevenness_, 0) + " %); ";
+  if (misfits_ > 0.1) doubt += format(100 * misfits_, 0) + " % of its positions fit no way; ";
+  if (unevenness_ > 0.01) doubt += "its speed was not even (" + format(100 * unevenness_, 0) + " %); ";
   return doubt;
 }
 

@@ -13,9 +13,8 @@
 namespace supertac {
 namespace {
 
-constexpr double kCoarseS = 0.05, kFineS = 0.01, kLeastCorrelation = 0.8, kNearlyAsGood = 0.93, kApartS = 0.4;
-constexpr std::size_t kSmoothed = 11;  // steps
-constexpr double kLeastS = 5, kMostOffsetDeviationS = 0.004, kMostRateDeviation = 4e-4;
+constexpr double kCoarseS = 0.05, kFineS = 0.01;
+constexpr double kLeastS = 5;
 
 // A course on even steps from its first time on, scaled to 0 to 1.
 struct Even {
@@ -138,7 +137,6 @@ Vector times(const Matrix& a, const Vector& x) {
 }
 
 Refined refine(const Even& sensor, const Even& film, double middle_s, const Place& from) {
-  constexpr int kRounds = 12;
   constexpr double kTogetherS = 1;  // residuals of a touch go together
   Vector unknown = {from.offset_s, from.rate, 1, 0, 0};
   Matrix normal;
@@ -146,7 +144,7 @@ Refined refine(const Even& sensor, const Even& film, double middle_s, const Plac
   std::vector<double> sizes;
   Sums sums;
   double deviation = 1;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < 12; ++round) {
     normal = {};
     Vector right{};
     scores.assign(
@@ -210,16 +208,15 @@ FilmClock find_film_clock(const LoadCourse& sensor, const LoadCourse& film) {
   if (places.empty()) refuse("they have fewer than 5 s in common");
   const Place best = *std::ranges::max_element(places, {}, &Place::correlation);
   for (const Place& other : places)
-    if (std::abs(other.offset_s - best.offset_s) > kApartS &&
-        other.correlation > kNearlyAsGood * best.correlation)
+    if (std::abs(other.offset_s - best.offset_s) > 0.4 && other.correlation > 0.93 * best.correlation)
       refuse("offsets of " + format(best.offset_s, 2) + " and " + format(other.offset_s, 2) + " s fit alike");
   Even fine_sensor(sensor, kFineS), fine_film(film, kFineS);
-  fine_sensor.smooth(kSmoothed), fine_film.smooth(kSmoothed);
+  fine_sensor.smooth(11), fine_film.smooth(11);
   const Refined fine = refine(fine_sensor, fine_film, middle, best);
-  if (!(fine.correlation >= kLeastCorrelation))
+  if (!(fine.correlation >= 0.8))
     refuse("their total loads have a correlation of " + format(fine.correlation, 2) +
            ", expected 0.8 or more");
-  if (!(fine.shift_deviation_s <= kMostOffsetDeviationS && fine.rate_deviation <= kMostRateDeviation))
+  if (!(fine.shift_deviation_s <= 0.004 && fine.rate_deviation <= 4e-4))
     refuse("the offset stays uncertain by " + format(fine.shift_deviation_s, 3) + " s, the rate by " +
            format(100 * fine.rate_deviation, 3) + " %");
   if (std::abs(fine.rate - 1) > kMostRate) refuse("a rate of " + format(fine.rate, 4));

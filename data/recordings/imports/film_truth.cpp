@@ -131,11 +131,10 @@ std::optional<FilmClock> clock_of_truth(const Recording& recording, std::span<co
 }
 
 std::optional<FilmClock> put_in_time(Recording& recording) {
-  constexpr double kSure = 4, kLeastS = 0.02;
   const auto clock = clock_of_truth(recording, recording.time_s);
   if (!clock) return std::nullopt;
   const double middle = (recording.time_s.front() + recording.time_s.back()) / 2;
-  if (std::abs(middle - clock->sensor_s(middle)) <= std::max(kLeastS, kSure * clock->offset_deviation_s))
+  if (std::abs(middle - clock->sensor_s(middle)) <= std::max(0.02, 4 * clock->offset_deviation_s))
     return std::nullopt;
   Recording film;
   film.time_s = recording.time_s, film.truth = std::move(recording.truth);

@@ -87,14 +87,14 @@ std::map<std::string, std::vector<std::size_t>> groups_of(const SafetensorsFile&
 // Refuses targets that show touches at other frames than the inputs. How fast frames came is not known: as if
 // 50 in a second.
 void check_lag(const SafetensorsFile& file, const std::string& group, const Recording& recording) {
-  constexpr double kFrameS = 0.02, kLeastFrames = 1.5, kSure = 4;
+  constexpr double kFrameS = 0.02;
   std::vector<double> time_s;
   for (std::size_t i = 0; i < recording.frames(); ++i) time_s.push_back(kFrameS * static_cast<double>(i));
   const auto clock = clock_of_truth(recording, time_s);
   if (!clock) return;
   const double middle = time_s.back() / 2, frames = (middle - clock->sensor_s(middle)) / kFrameS,
                deviation = clock->offset_deviation_s / kFrameS;
-  if (std::abs(frames) <= std::max(kLeastFrames, kSure * deviation)) return;
+  if (std::abs(frames) <= std::max(1.5, 4 * deviation)) return;
   throw FileError(file.path(), (group.empty() ? "" : "group " + group + ": ") + "target shows touches " +
                                    format(std::abs(frames), 1) + " +- " + format(deviation, 1) + " frames " +
                                    (frames > 0 ? "later" : "earlier") +

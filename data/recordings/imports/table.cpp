@@ -114,8 +114,6 @@ Table numpy_table(const std::string& path, FileReader& file) {
 
 // --- text
 
-constexpr std::size_t kLinesToLearn = 2000;
-
 /// Empty lines and remarks hold none.
 bool holds_row(std::string_view line) {
   const std::string_view content = trimmed(line);
@@ -131,7 +129,7 @@ Table text_table(const std::string& path) {
     return line;
   };
   std::vector<std::string> learnt;
-  while (!text.empty() && learnt.size() < kLinesToLearn) learnt.emplace_back(next());
+  while (!text.empty() && learnt.size() < 2000) learnt.emplace_back(next());
   const std::optional<TextGrammar> grammar = find_grammar(learnt);
   if (!grammar)
     throw FileError(path,

@@ -187,8 +187,7 @@ void check_taxel(const std::string& path, const Table& table, std::size_t column
 
 /// NaN is a position that is not known.
 float checked_mm(const std::string& path, const Table& table, std::size_t column, double mm) {
-  constexpr double kFarthestMm = 1e5;
-  if (std::isnan(mm) || std::abs(mm) <= kFarthestMm) return static_cast<float>(mm);
+  if (std::isnan(mm) || std::abs(mm) <= 1e5) return static_cast<float>(mm);
   throw FileError(
       path, name_of(table, column) + " as a position holds " + format(mm) + ", expected mm on the plate");
 }
@@ -245,9 +244,7 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
   recording.time_s = times_of(path, table, columns.time, unit, sensor.rate_hz);
   check_rate(path, table, columns.time, recording, sensor.rate_hz);
   // No sensor has been on since 2001: such a clock counts from 1970.
-  constexpr double kWallClockS = 1e9;
-  if (!recording.time_s.empty() && recording.time_s.front() >= kWallClockS)
-    recording.metadata["began_s"] = "0";
+  if (!recording.time_s.empty() && recording.time_s.front() >= 1e9) recording.metadata["began_s"] = "0";
   std::vector<bool> silent(columns.values.size());
   for (const int taxel : sensor.dead)
     for (int c = 0; c < sensor.array.channels && sensor.order.empty(); ++c)

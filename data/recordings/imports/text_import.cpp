@@ -10,7 +10,6 @@
 namespace supertac {
 namespace {
 
-constexpr std::uint64_t kMaxTextBytes = std::uint64_t{64} << 20;
 constexpr std::string_view kSeparators = " \t,\r";
 
 /// What a line is: the counter that it belongs to.
@@ -65,7 +64,7 @@ void refuse_other_files(const std::string& path, const ImportReport& report) {
 
 Recording import_text_pass(const std::string& path, ImportReport& report) {
   report = {};
-  const std::string text = read_text_file(path, kMaxTextBytes);
+  const std::string text = read_text_file(path, 64 << 20);
   Recording recording;
   recording.source = "imported";
   recording.metadata["time_base"] = "nominal";
