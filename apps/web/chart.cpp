@@ -48,12 +48,6 @@ std::string path(double x, double y, const char* way) {
   return "<path d=\"M" + format(x, 1) + " " + format(y, 1) + way + "\" stroke=\"var(--line)\"/>";
 }
 
-// digits 10^exponent as the number that is written so: 3 and -1 give 0.3, which 3 * 0.1 is not.
-double shifted(double digits, double exponent) {
-  return exponent < 0 ? digits / std::round(std::pow(10, -exponent))
-                      : digits * std::round(std::pow(10, exponent));
-}
-
 Points shown(const ChartAxis& x, const ChartAxis& y, const Points& points) {
   const auto fits = [](double v, const ChartAxis& axis) {
     return std::isfinite(v) && (v > 0 || !axis.logarithmic);
@@ -90,7 +84,7 @@ std::vector<double> round_numbers(double low, double high, bool logarithmic) {
     const double every = std::max(1.0, std::ceil(decades / 7));
     for (double e = std::floor(std::log10(low)); e <= std::log10(high) + 1e-9; e += every)
       for (const double digit : {1.0, 2.0, 5.0})
-        if (const double v = shifted(digit, e);
+        if (const double v = decimal(digit, e);
             (digit == 1 || decades <= 2.5) && v >= low * (1 - 1e-9) && v <= high * (1 + 1e-9))
           numbers.push_back(v);
     if (numbers.size() >= 2) return numbers;
@@ -103,7 +97,7 @@ std::vector<double> round_numbers(double low, double high, bool logarithmic) {
                                                                             : 10;
   const double step = digit * std::pow(10, exponent);
   for (double n = std::ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; ++n)
-    numbers.push_back(shifted(n * digit, exponent) + 0.0);  // not -0
+    numbers.push_back(decimal(n * digit, exponent) + 0.0);  // not -0
   return numbers;
 }
 

@@ -59,8 +59,8 @@ void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::option
   const auto [lowest, highest] = std::ranges::minmax(rests);
   const double uneven = moving.empty() ? 0 : std::ranges::max(moving) - std::ranges::min(moving);
   draft.scale.unit = known ? known->scale.unit : whole ? "counts" : "unknown unit";
-  says.push_back("at rest " + format(lowest) + " to " + format(highest) + ", median " + format(rest) +
-                 ", noise " + format(noise, 3) + " from frame to frame" +
+  says.push_back("at rest " + format(float(lowest)) + " to " + format(float(highest)) + ", median " +
+                 format(float(rest)) + ", noise " + format(noise, 3) + " from frame to frame" +
                  (known   ? ""
                   : whole ? "; whole numbers, called counts"
                           : "; set \"unit\""));

@@ -149,7 +149,7 @@ std::vector<double> times_of(const std::string& path, const Table& table, std::s
       throw FileError(path, name_of(table, column) + " as time: no number in " + place(table, i));
     if (i > 0 && t < time_s.back())
       throw FileError(path, name_of(table, column) + " as time falls in " + place(table, i) + ", from " +
-                                format(time_s.back() / unit) + " to " + format(t / unit) +
+                                format(table.row(i - 1)[column]) + " to " + format(table.row(i)[column]) +
                                 "; name another column, --columns time=NAME");
     time_s.push_back(t);
   }
@@ -294,9 +294,9 @@ void add_positions(Recording& recording, const std::string& path, const Table& l
   if (10 * known < recording.frames())
     throw FileError(path, "says where " + std::to_string(known) + " of " +
                               std::to_string(recording.frames()) + " frames were: it has times from " +
-                              format(time_s.front()) + " to " + format(time_s.back()) +
-                              " s, the frames from " + format(recording.time_s.front()) + " to " +
-                              format(recording.time_s.back()) +
+                              format(time_s.front(), 3) + " to " + format(time_s.back(), 3) +
+                              " s, the frames from " + format(recording.time_s.front(), 3) + " to " +
+                              format(recording.time_s.back(), 3) +
                               " s; are both of one clock, in the unit that --columns names?");
 }
 

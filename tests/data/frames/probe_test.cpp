@@ -274,7 +274,7 @@ TEST(Probe, TakesNoClockForATaxel) {
   for (int n = 0; n < 100; ++n) {
     const int at = n % 7 == 6 ? n - 1 : n;  // some stamps are those of the frame before
     const double ms = 20 * at + (n > 30 ? 12'000 : 0), noise = n * 7 % 5;
-    heard.push_back({100 + 0.02 * n, format(ms) + "," + format(ms * 77) + "," + format(100 + noise) + "," +
+    heard.push_back({100 + 0.02 * n, format(ms) + "," + format(ms * 77) + "," + format(100.1 + noise) + "," +
                                          format(120 - noise) + "\n"});
   }
   const ProbeReport report = drafted(heard);
@@ -283,6 +283,7 @@ TEST(Probe, TakesNoClockForATaxel) {
   EXPECT_EQ(report.draft->frame.time->unit_s, 1e-3);
   EXPECT_EQ(report.draft->frame.skip, std::vector{1});
   EXPECT_EQ(report.draft->values(), 2U);
+  expect_said(report, "at rest 102.1 to 118,");
 }
 
 TEST(Probe, SaysThatNoLineEnds) {
