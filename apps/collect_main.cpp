@@ -120,24 +120,11 @@ RecorderSettings read_settings(const Arguments& arguments, const std::string& ou
   return settings;
 }
 
-std::uint64_t millimetres(const PalpationPlan& plan, int passes, double more) {
-  return static_cast<std::uint64_t>(plan.slide * passes + more);
-}
-
-/// Of all slides, how far the finger has come.
-std::uint64_t millimetres_at(const PalpationPlan& plan, const Leg& leg, const Point3& at) {
-  double part = leg.phase == Phase::slide ? at.y - leg.from.y : 0;
-  if (leg.phase == Phase::release) part = plan.slide;
-  return millimetres(plan, leg.pass - 1, std::clamp(part, 0.0, plan.slide));
-}
-
 std::string live_text(const Point3& at, const ReaderCounters& board) {
   return "X" + format(at.x, 1) + " Y" + format(at.y, 1) + "  " + format(1 / board.period_s, 0) +
          " frames/s  " + std::to_string(board.missing) + " lost";
 }
 
-/// A run that may move the head: marked until the head is back, or until it turns out that nothing could be
-/// moved.
 std::string text_of(const std::exception_ptr& error) {
   try {
     if (error) std::rethrow_exception(error);
@@ -147,6 +134,8 @@ std::string text_of(const std::exception_ptr& error) {
   return "stopped";
 }
 
+/// A run that may move the head: marked until the head is back, or until it turns out that nothing could be
+/// moved.
 RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
                              RecorderSettings settings, const OriginMark& mark) {
   const bool marked_before = mark.is_set();
@@ -225,16 +214,17 @@ void refuse_taken(const Arguments& arguments, const std::string& out, Recording 
 
 RecorderReport collect(const Arguments& arguments, std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
                        RecorderSettings settings, const OriginMark& mark) {
-  const PalpationPlan& plan = settings.bed.plan;
   const std::unique_ptr<CollectView> page = web_view(arguments, settings.bed);
   confirm(arguments, settings);
   settings.stop = interrupted;
-  Progress progress(arguments, "collecting", millimetres(plan, plan.passes, 0), "mm");
-  const std::vector<Leg> legs = legs_of(plan, settings.bed.origin);
+  const std::vector<Leg> legs = legs_of(settings.bed.plan, settings.bed.origin);
+  const double all_s = seconds_left(legs, legs.front(), legs.front().from);
+  Progress progress(arguments, "collecting", static_cast<std::uint64_t>(all_s), "s");
   const double speedup = arguments.number("speedup", 0.1, 100);
   settings.progress = [&](const Leg& leg, const Point3& at, const ReaderCounters& counters) {
-    progress.update(millimetres_at(plan, leg, at), live_text(at, counters),
-                    seconds_left(legs, leg, at) / speedup);
+    const double left_s = seconds_left(legs, leg, at);
+    progress.update(static_cast<std::uint64_t>(std::max(0.0, all_s - left_s)), live_text(at, counters),
+                    left_s / speedup);
     if (page) page->update(leg, at, counters);
   };
   try {

@@ -2,8 +2,6 @@
 
 #include <signal.h>
 
-#include <algorithm>
-
 #include "apps/common/running/signals.h"
 #include "apps/web/encode.h"
 #include "apps/web/pages.h"
@@ -75,16 +73,14 @@ std::string CollectView::news() {
   }
   if (!state) return {};
   const auto& [leg, at, board] = *state;
-  const double slid = leg.phase == Phase::slide     ? std::clamp(at.y - leg.from.y, 0.0, bed_.plan.slide)
-                      : leg.phase >= Phase::release ? bed_.plan.slide
-                                                    : 0;
+  const double left_s = seconds_left(legs_, leg, at);
   return dumped({{"pass", leg.pass},
                  {"phase", name_of(leg.phase)},
                  {"x", at.x - bed_.limits.plate.x},
                  {"y", at.y - bed_.limits.plate.y},
                  {"lifted", at.z > bed_.plan.start.z + 0.1},
-                 {"left_s", seconds_left(legs_, leg, at) / speedup_},
-                 {"done", (bed_.plan.slide * (leg.pass - 1) + slid) / (bed_.plan.slide * bed_.plan.passes)},
+                 {"left_s", left_s / speedup_},
+                 {"done", 1 - left_s / seconds_left(legs_, legs_.front(), legs_.front().from)},
                  {"frames", board.decoder.frames},
                  {"rate", board.period_s > 0 ? 1 / board.period_s : 0},
                  {"lost", board.missing},
