@@ -1,4 +1,4 @@
-// The compiler of the virtual printer: straight moves with acceleration, one after the other, each stopping
+// The planner of the virtual printer: straight moves with acceleration, one after the other, each stopping
 // at its end. A move that finds the queue empty starts late.
 #pragma once
 

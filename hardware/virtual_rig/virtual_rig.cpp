@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <optional>
+#include <utility>
 
+#include "hardware/printers/marlin_line.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -27,6 +29,29 @@ std::optional<double> parameter(const std::string& command, std::string_view nam
   const char *first = command.data() + at + name.size(), *last = command.data() + command.size();
   const auto [end, error] = std::from_chars(first, last, value, std::chars_format::fixed);
   return error == std::errc{} ? std::optional(value) : std::nullopt;
+}
+
+std::string NumberedLines::complaint(const std::string& what) const {
+  return "Error:" + what + ", Last Line: " + std::to_string(last) + "\nResend: " + std::to_string(last + 1) +
+         "\nok\n";
+}
+
+NumberedLines::Taken NumberedLines::take(const std::string& received) {
+  const std::string line = received.c_str();  // as Marlin, for which a 0 byte ends it
+  const std::size_t star = line.rfind('*'), space = line.find(' '), sets = line.find("M110");
+  if (line[0] != 'N') return {line.substr(0, star), {}};
+  std::optional<double> number = sets == std::string::npos ? std::nullopt : parameter(line.substr(sets), "N");
+  if (!number) number = parameter(" " + line, "N");
+  const auto at = static_cast<std::int64_t>(std::clamp(number.value_or(-1), -1.0, 1e15));
+  if (sets == std::string::npos && ignores_repetitions && (at == last || at == last - 1)) return {};
+  if (sets == std::string::npos && at != last + 1)
+    return {{}, complaint("Line Number is not Last Line Number+1")};
+  if (star == std::string::npos) return {{}, complaint("No Checksum with line number")};
+  if (parameter(" " + line.substr(star), "*") != marlin_checksum(line.substr(0, star)))
+    return {{}, complaint("checksum mismatch")};
+  last = at;
+  const std::size_t first = space < star ? space + 1 : 1;
+  return {line.substr(first, star - first), {}};
 }
 
 BoardFrame frame_of(const TaxelVolts& volts) {
@@ -83,21 +108,10 @@ void PlainRig::to_printer(std::span<const std::byte> bytes) {
 }
 
 void PlainRig::take_line(const std::string& line) {
-  std::string command = line.substr(0, line.find('*'));
-  std::optional<double> number;
-  if (command[0] == 'N') {
-    number = parameter(" " + command, "N");
-    command.erase(0, std::min(command.size(), command.find(' ') + 1));
-  }
-  if (command.empty()) return;
-  const std::string code = code_of(command);
-  if (number && code != "M110" && *number != line_ + 1) {
-    if (*number != line_ && *number != line_ - 1)  // a repetition
-      output_ += "Error:Line Number is not Last Line Number+1, Last Line: " + format(line_) +
-                 "\nResend: " + format(line_ + 1) + "\nok\n";
-    return;
-  }
-  line_ = number.value_or(line_);
+  const auto [command, complaint] = lines_.take(line);
+  output_ += complaint;
+  if (!command || command->empty()) return;
+  const std::string code = code_of(*command);
   if (code == "M410") {  // acts ahead of the queue, and holds what comes behind it
     motion_.stop(now_s_);
     held_until_s_ = now_s_;
@@ -108,7 +122,7 @@ void PlainRig::take_line(const std::string& line) {
     halted_ = true;
     return;
   }
-  waiting_.push_back(command);
+  waiting_.push_back(*command);
   run_waiting();
 }
 
@@ -125,13 +139,16 @@ std::string PlainRig::answer_to(const std::string& command) {
   const std::string code = code_of(command);
   if (code == "G0" || code == "G1") {
     move(command);
-  } else if (code == "G28") {
-    home();
   } else if (code == "G92") {
-    const Point3 at = motion_.target();
-    zero_ = {at.x - parameter(command, "X").value_or(at.x - zero_.x),
-             at.y - parameter(command, "Y").value_or(at.y - zero_.y),
-             at.z - parameter(command, "Z").value_or(at.z - zero_.z)};
+    const Point3 at = motion_.target(), named = place_in(command, false);
+    zero_ = {at.x - named.x, at.y - named.y, at.z - named.z};
+  } else if (code == "G20" || code == "G21") {
+    unit_mm_ = code == "G20" ? 25.4 : 1;
+  } else if (code == "G90" || code == "G91") {
+    relative_ = code == "G91";
+  } else if (code == "M220") {
+    if (!parameter(command, "S")) return "FR:" + format(speed_percent_) + "%\n";
+    speed_percent_ = *parameter(command, "S");
   } else if (code == "M114") {
     const Point3 p = command.ends_with("R") ? motion_.at(now_s_) : motion_.target();
     return "X:" + format(p.x - zero_.x, 2) + " Y:" + format(p.y - zero_.y, 2) +
@@ -140,36 +157,37 @@ std::string PlainRig::answer_to(const std::string& command) {
     return " T:25.00 /0.00 B:25.00 /0.00 @:0 B@:0\n";
   } else if (code == "M115") {
     return "FIRMWARE_NAME:Marlin 2.1.2 (virtual rig) PROTOCOL_VERSION:1.0\nCap:EMERGENCY_PARSER:1\n";
-  } else if (code == "M400" || code == "M410") {
+  } else if (code == "G28" || code == "M400" || code == "M410") {
+    if (code == "G28") motion_.home(now_s_), zero_ = {};
     held_ = true;
     held_until_s_ = code == "M410" ? now_s_ + kStopHoldsS : std::max(now_s_, motion_.end_time());
-  } else if (code != "M110" && code != "G21" && code != "G90") {
+  } else if (code != "M110" && code != "M108") {
     return "echo:Unknown command: \"" + command + "\"\n";
   }
   return {};
 }
 
-void PlainRig::move(const std::string& command) {
-  feed_mm_s_ = parameter(command, "F").value_or(60 * feed_mm_s_) / 60;
-  const Point3 from = motion_.target();
-  const Point3 to{parameter(command, "X").value_or(from.x - zero_.x) + zero_.x,
-                  parameter(command, "Y").value_or(from.y - zero_.y) + zero_.y,
-                  parameter(command, "Z").value_or(from.z - zero_.z) + zero_.z};
-  motion_.move_to(to, feed_mm_s_, now_s_);
+// Where it leads to, or is to be called, in the coordinates of commands.
+Point3 PlainRig::place_in(const std::string& command, bool relative) const {
+  const Point3 at = motion_.target();
+  const auto axis = [&](const char* name, double from) {
+    const auto value = parameter(command, name);
+    return value ? unit_mm_ * *value + (relative ? from : 0) : from;
+  };
+  return {axis("X", at.x - zero_.x), axis("Y", at.y - zero_.y), axis("Z", at.z - zero_.z)};
 }
 
-void PlainRig::home() {
-  motion_.home(now_s_);
-  zero_ = {};
-  held_ = true;
-  held_until_s_ = motion_.end_time();
+void PlainRig::move(const std::string& command) {
+  if (const auto feed = parameter(command, "F")) feed_mm_s_ = unit_mm_ * *feed / 60;
+  const Point3 to = place_in(command, relative_);
+  motion_.move_to({to.x + zero_.x, to.y + zero_.y, to.z + zero_.z}, feed_mm_s_ * speed_percent_ / 100,
+                  now_s_);
 }
 
 std::vector<std::byte> PlainRig::from_printer() {
-  const auto bytes = std::as_bytes(std::span(output_));
-  std::vector<std::byte> sent(bytes.begin(), bytes.end());
-  output_.clear();
-  return sent;
+  const std::string sent = std::exchange(output_, {});
+  const auto bytes = std::as_bytes(std::span(sent));
+  return {bytes.begin(), bytes.end()};
 }
 
 }  // namespace supertac

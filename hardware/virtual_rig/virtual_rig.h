@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <optional>
@@ -42,9 +43,21 @@ BoardFrame frame_of(const TaxelVolts& volts);
 /// The number behind a letter, as Marlin's parser reads it.
 std::optional<double> parameter(const std::string& command, std::string_view name);
 
+/// How Marlin takes lines: each number once and in order, with a checksum. M110 sets the number.
+struct NumberedLines {
+  struct Taken {
+    std::optional<std::string> command;  ///< without number and checksum; none where the line must not run
+    std::string complaint;               ///< why; empty of a line that is ignored
+  };
+  std::int64_t last = 0;
+  bool ignores_repetitions = true;  ///< since 2.1.2; before, it complained of their number
+
+  Taken take(const std::string& received);
+  std::string complaint(const std::string& what) const;
+};
+
 /// The board at its nominal rate. A running Marlin with an emergency parser, the head at rig::kMounted, that
-/// checks the numbers of lines alone and knows G0, G1, G21, G28, G90, G92, M105, M110, M112, M114 (R), M115,
-/// M400 and M410.
+/// knows G0, G1, G20, G21, G28, G90, G91, G92, M105, M108, M110, M112, M114 (R), M115, M220, M400 and M410.
 class PlainRig : public RigAtPorts {
  public:
   PlainRig(FingerSignals signals, double t);
@@ -57,20 +70,21 @@ class PlainRig : public RigAtPorts {
   void take_line(const std::string& line);
   void run_waiting();
   std::string answer_to(const std::string& command);
+  Point3 place_in(const std::string& command, bool relative) const;
   void move(const std::string& command);
-  void home();
   void send_frame();
   double next_frame() const { return start_s_ + static_cast<double>(frames_ + 1) * rig::kFramePeriodS; }
 
   FingerSignals signals_;
   MotionQueue motion_;
-  double start_s_, now_s_, held_until_s_ = -1;    // by the command that runs
-  Point3 zero_;                                   // logical = physical - zero
-  double feed_mm_s_ = rig::kSlideMmS, line_ = 0;  // the last number
-  std::deque<std::string> waiting_;               // commands
+  double start_s_, now_s_, held_until_s_ = -1;  // by the command that runs
+  Point3 zero_;                                 // logical = physical - zero
+  double feed_mm_s_ = rig::kSlideMmS, unit_mm_ = 1, speed_percent_ = 100;
+  NumberedLines lines_;
+  std::deque<std::string> waiting_;  // commands
   std::string partial_, output_;
   std::uint64_t frames_ = 0;
-  bool held_ = false, halted_ = false;
+  bool held_ = false, halted_ = false, relative_ = false;
 };
 
 }  // namespace supertac

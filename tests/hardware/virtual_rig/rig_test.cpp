@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "hardware/printers/marlin_line.h"
+#include "hardware/virtual_rig/virtual_rig.h"
+
 namespace supertac {
 namespace {
 
@@ -24,6 +27,28 @@ TEST(Rig, AdcRoundTrips) {
   EXPECT_EQ(rig::adc_of(9), 4095);
   EXPECT_EQ(rig::adc_of(std::nan("")), 0);
   for (const int code : {0, 1, 3028, 4095}) EXPECT_EQ(rig::adc_of(rig::volts_of(code)), code);
+}
+
+TEST(PlainRig, RunsNoDamagedLineAndKnowsTheModesOfOtherJobs) {
+  PlainRig rig([](double, double, double, double) { return TaxelVolts{}; }, 0);
+  const auto said = [&rig](const std::string& line) {
+    rig.to_printer(std::as_bytes(std::span(line)));
+    const auto bytes = rig.from_printer();
+    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  };
+  const std::string refused = ", Last Line: 0\nResend: 1\nok\n", none = "Error:No Checksum with line number";
+  EXPECT_EQ(said(numbered_line(0, "M110 N0")), "ok\n");
+  EXPECT_EQ(said("N1 G92 X10*0\n"), "Error:checksum mismatch" + refused);
+  EXPECT_EQ(said("N1 G92 X10\n"), none + refused);
+  EXPECT_EQ(said(numbered_line(1, "G92 X10").insert(9, 1, '\0')), none + refused) << "the sum is as it was";
+  std::int64_t number = 0;
+  for (const char* command :
+       {"G92 X10 Y0 Z0", "G20", "G91", "M220 S200", "M108", "G1 X1 F60", "G90", "G1 Y2"})
+    EXPECT_EQ(said(numbered_line(++number, command)), "ok\n") << command;
+  EXPECT_EQ(said(numbered_line(number, "G1 Y2")), "") << "a repetition";
+  EXPECT_EQ(said(numbered_line(++number, "M220")), "FR:200%\nok\n");
+  rig.advance(2);
+  EXPECT_TRUE(said(numbered_line(++number, "M114 R")).starts_with("X:35.40 Y:50.80 Z:0")) << "twice as fast";
 }
 
 }  // namespace

@@ -16,12 +16,6 @@ constexpr std::size_t kCommandBuffer = 4;  // Marlin's BUFSIZE
 constexpr std::size_t kReceiveLines = 6;   // about 128 bytes
 constexpr double kReplyDelayS = 0.0003;
 
-std::int64_t integer_at(const std::string& text, std::size_t at) {
-  std::int64_t value = -1;
-  if (at < text.size()) (void)std::from_chars(text.data() + at, text.data() + text.size(), value);
-  return value;
-}
-
 // The code that Marlin's emergency parser sees in a line: spaces, a line number, an M and its digits. What
 // follows the digits it knows does not matter to it, not even more digits.
 std::string_view emergency_code(std::string_view line) {
@@ -46,6 +40,7 @@ VirtualPrinter::VirtualPrinter(const VirtualPrinterSettings& settings, double t,
       dice_(settings.seed, 101),
       now_(t),
       boot_end_(t) {
+  lines_.ignores_repetitions = settings.firmware == Firmware::marlin;
   if (klipper()) settings_.emergency_parser = settings_.keepalive = settings_.realtime_position = false;
   reset(t);
   if (already_running) {
@@ -55,7 +50,7 @@ VirtualPrinter::VirtualPrinter(const VirtualPrinterSettings& settings, double t,
     ready_s_ = t + settings.starts_s;
     report_every(settings.auto_position_s, settings.auto_temperature_s);
     output_.clear();
-    last_line_ = 357;
+    lines_.last = 357;
   }
 }
 
@@ -70,11 +65,14 @@ void VirtualPrinter::reset(double t) {
   blocked_ = repeat_after_block_ = homed_ = halted_ = may_move_ = false;
   left_over_ = {};
   base_ = {};
+  saved_.clear();
+  kept_mesh_mm_ = 0;
   command_due_ = -1;
-  last_line_ = 0;
+  lines_.last = 0;
   booting_ = true;
   boot_end_ = t + settings_.boot_s;
   wait_due_ = boot_end_ + 1;
+  if (klipper()) output_ += "// Klipper state: Disconnect\n";
   output_ += settings_.boot_garbage;
 }
 
@@ -131,14 +129,12 @@ void VirtualPrinter::act_on_critical(std::string_view code, double t) {
 
 void VirtualPrinter::accept_line(const std::string& line, double t) {
   if (klipper()) return take_klipper_line(line, t);
-  std::string command = line;
-  if (line[0] == 'N') {
-    if (!check_numbered(line, command)) return;
-    if (hook_) hook_(last_line_, command, t);
-    if (halted_ || booting_ || unplugged_) return;
-  } else if (const std::size_t star = command.rfind('*'); star != std::string::npos) {
-    command.resize(star);
-  }
+  const auto [taken, complaint] = lines_.take(line);
+  if (!complaint.empty()) complain(complaint);
+  if (!taken) return;
+  const std::string& command = *taken;
+  if (line[0] == 'N' && hook_) hook_(lines_.last, command, t);
+  if (halted_ || booting_ || unplugged_) return;
   // Without an emergency parser an unnumbered stop acts when its line is read.
   if (!settings_.emergency_parser && (command == "M112" || command == "M410" || command == "M108")) {
     act_on_critical(std::string_view(command).substr(1), t);
@@ -152,7 +148,7 @@ void VirtualPrinter::accept_line(const std::string& line, double t) {
 void VirtualPrinter::take_klipper_line(const std::string& line, double t) {
   std::string command = line.substr(0, line.find('*'));
   if (command[0] == 'N') command.erase(0, std::min(command.size(), command.find(' ')) + 1);
-  if (hook_) hook_(++last_line_, command, t);
+  if (hook_) hook_(++lines_.last, command, t);
   if (command == "M112") halted_ = true, motion_.stop(t);
   if (halted_) {
     output_ +=
@@ -164,39 +160,8 @@ void VirtualPrinter::take_klipper_line(const std::string& line, double t) {
   if (command_due_ < 0 && !blocked_) command_due_ = t + kReplyDelayS;
 }
 
-bool VirtualPrinter::check_numbered(const std::string& line, std::string& command) {
-  const bool sets_number = line.find("M110") != std::string::npos;
-  std::size_t digits = 1;
-  if (sets_number) {
-    const std::size_t second = line.find('N', line.find("M110") + 4);
-    if (second != std::string::npos) digits = second + 1;
-  }
-  const std::int64_t number = integer_at(line, digits);
-  const bool repetition = number == last_line_ || number == last_line_ - 1;
-  if (repetition && !sets_number && settings_.firmware == Firmware::marlin) return false;
-  if (number != last_line_ + 1 && !sets_number) {
-    complain("Line Number is not Last Line Number+1");
-    return false;
-  }
-  const std::size_t star = line.rfind('*');
-  if (star == std::string::npos) {
-    complain("No Checksum with line number");
-    return false;
-  }
-  if (integer_at(line, star + 1) != marlin_checksum(line.substr(0, star))) {
-    complain("checksum mismatch");
-    return false;
-  }
-  last_line_ = number;
-  const std::size_t space = line.find(' ');
-  command = line.substr(space == std::string::npos ? 1 : space + 1,
-                        star - (space == std::string::npos ? 1 : space + 1));
-  return true;
-}
-
-void VirtualPrinter::complain(const std::string& what) {
-  output_ += "Error:" + what + ", Last Line: " + std::to_string(last_line_) +
-             "\nResend: " + std::to_string(last_line_ + 1) + "\nok\n";
+void VirtualPrinter::complain(const std::string& text) {
+  output_ += text;
   received_.clear();
   partial_.clear();
 }
@@ -206,7 +171,7 @@ void VirtualPrinter::advance(double t) {
     now_ = std::max(now_, next_event());
     if (booting_) {
       booting_ = false;
-      if (!klipper()) output_ += marlin_banner();
+      output_ += klipper() ? "// Klipper state: Ready\n" : marlin_banner();
     } else if (std::min(position_due_, temperature_due_) <= now_) {
       automatic_report(now_);
     } else if (blocked_ && blocked_until_ <= now_) {
@@ -254,7 +219,7 @@ void VirtualPrinter::start_next(double t) {
   if (random_trouble(t)) return;
   const std::string& front = queue_.front();
   const bool is_move = front.starts_with("G1") || front.starts_with("G0");
-  if (is_move && motion_.full(t)) {  // its ok waits for room in the compiler
+  if (is_move && motion_.full(t)) {  // its ok waits for room in the planner
     repeat_after_block_ = true;
     return block_until(motion_.next_end(), t);
   }
@@ -297,7 +262,7 @@ bool VirtualPrinter::random_trouble(double t) {
     return true;
   }
   if (dice_.hit(faults.resend_storm_rate)) {
-    for (int i = 0; i < 3; ++i) complain("checksum mismatch");
+    for (int i = 0; i < 3; ++i) complain(lines_.complaint("checksum mismatch"));
   }
   return false;
 }
@@ -322,7 +287,7 @@ void VirtualPrinter::reply_ok() {
   output_ += "ok" + text;
   if (settings_.advanced_ok)
     output_ +=
-        " N" + std::to_string(last_line_) + " P15 B" + std::to_string(kCommandBuffer - 1 - queue_.size());
+        " N" + std::to_string(lines_.last) + " P15 B" + std::to_string(kCommandBuffer - 1 - queue_.size());
   output_ += "\n";
 }
 

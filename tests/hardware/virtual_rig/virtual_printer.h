@@ -9,11 +9,14 @@
 #include <deque>
 #include <functional>
 #include <limits>
+#include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "hardware/virtual_rig/motion_queue.h"
+#include "hardware/virtual_rig/virtual_rig.h"
 #include "tests/hardware/virtual_rig/faults.h"
 
 namespace supertac {
@@ -37,7 +40,6 @@ struct VirtualPrinterSettings {
   Point3 bed = rig::kBed;         ///< soft limits once homed: 0 ... bed
   bool realtime_position = true;  ///< M114 R reports the head, not the end of the queue
   bool emergency_parser = true;
-  bool display = false;      ///< where M0 can be answered
   bool advanced_ok = false;  ///< `ok N0 P15 B3`
   bool homing_fails = false;
   LeftOver left_over{};
@@ -100,7 +102,7 @@ class VirtualPrinter {
   void inject(const std::string& text) { output_ += text; }
 
   const std::vector<Executed>& executed() const { return executed_; }
-  std::int64_t last_line() const { return last_line_; }
+  std::int64_t last_line() const { return lines_.last; }
 
  private:
   static constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -110,8 +112,7 @@ class VirtualPrinter {
   void act_on_critical(std::string_view code, double t);
   void take_received(double t);
   void accept_line(const std::string& line, double t);
-  bool check_numbered(const std::string& line, std::string& command);
-  void complain(const std::string& what);
+  void complain(const std::string& text);
   void take_klipper_line(const std::string& line, double t);
   void start_next(double t);
   bool klipper() const { return settings_.firmware == Firmware::klipper; }
@@ -139,13 +140,13 @@ class VirtualPrinter {
   MotionQueue motion_;
   Dice dice_;
   Point3 offset_, base_;  // logical = physical - offset - base; base_: Klipper's own
-  LeftOver left_over_, saved_;
-  Point3 saved_base_;
-  double kept_mesh_mm_ = 0;           // of Klipper's profile
-  double ready_s_ = 0;                // of Klipper
-  Point3 steps_zero_;                 // where Count is 0; G92 does not move it
-  std::deque<std::string> received_;  // whole lines not yet looked at
-  std::deque<std::string> queue_;     // accepted, not yet run
+  LeftOver left_over_;
+  std::map<std::string, std::pair<LeftOver, Point3>> saved_;  // of Klipper, with its base, by NAME=
+  double kept_mesh_mm_ = 0;                                   // of its profile
+  double ready_s_ = 0;                                        // of Klipper
+  Point3 steps_zero_;                                         // where Count is 0; G92 does not move it
+  std::deque<std::string> received_;                          // whole lines not yet looked at
+  std::deque<std::string> queue_;                             // accepted, not yet run
   std::string partial_;
   std::string emergency_;
   std::string output_;
@@ -159,7 +160,7 @@ class VirtualPrinter {
   double wait_due_ = 0;
   double feed_ = 10;
   double position_every_ = 0, position_due_ = 0, temperature_every_ = 0, temperature_due_ = 0;  // 0: off
-  std::int64_t last_line_ = 0;
+  NumberedLines lines_;
   bool booting_ = false, blocked_ = false, homed_ = false, halted_ = false, unplugged_ = false;
   bool repeat_after_block_ = false;  // what holds the firmware is no command: no ok at its end
   bool waits_for_user_ = false;

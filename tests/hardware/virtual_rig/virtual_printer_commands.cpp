@@ -5,17 +5,15 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <tuple>
 
 #include "hardware/virtual_rig/virtual_rig.h"
 #include "io/numbers/numbers.h"
 #include "tests/hardware/virtual_rig/marlin_texts.h"
 
 namespace supertac {
-namespace {
 
 constexpr double kInch = 25.4;
-
-}  // namespace
 
 void VirtualPrinter::unknown(const std::string& command) {
   output_ += klipper() ? "// Unknown command:\"" + command.substr(0, command.find(' ')) + "\"\n"
@@ -35,29 +33,20 @@ void VirtualPrinter::run(const std::string& command, double t) {
 
 void VirtualPrinter::run_g(int code, const std::string& command, double t) {
   executed_.push_back({t, command});
-  switch (code) {
-    case 0:
-    case 1:
-      return move(command, t);
-    case 4:
-      return block_until(std::max(t, motion_.end_time()) + parameter(command, "S").value_or(0) +
-                             1e-3 * parameter(command, "P").value_or(0),
-                         t);
-    case 28:
-      return home(t);
-    case 20:
-    case 21:
-      left_over_.inches = code == 20;
-      return;
-    case 90:
-    case 91:
-      left_over_.relative = code == 91;
-      return;
-    case 92:
-      return set_position(command);
-    default:
-      executed_.pop_back();
-      unknown(command);
+  if (code == 0 || code == 1) return move(command, t);
+  if (code == 4)
+    return block_until(std::max(t, motion_.end_time()) + parameter(command, "S").value_or(0) +
+                           1e-3 * parameter(command, "P").value_or(0),
+                       t);
+  if (code == 28) return home(t);
+  if (code == 92) return set_position(command);
+  if (code == 20 || code == 21) {
+    left_over_.inches = code == 20;
+  } else if (code == 90 || code == 91) {
+    left_over_.relative = code == 91;
+  } else {
+    executed_.pop_back();
+    unknown(command);
   }
 }
 
@@ -68,14 +57,17 @@ bool VirtualPrinter::run_klipper(const std::string& command, double t) {
         "// retry in a few moments.\n!! Printer is not ready\n";
     return true;
   }
+  const std::string name = command.substr(command.find(' ') + 1);
   Point3& offset = left_over_.offset;
   if (command.starts_with("SET_KINEMATIC_POSITION")) {
     set_position(command);
   } else if (command.starts_with("SAVE_GCODE_STATE")) {
-    saved_ = left_over_, saved_base_ = base_;
+    saved_[name] = {left_over_, base_};
+  } else if (command.starts_with("RESTORE_GCODE_STATE") && !saved_.contains(name)) {
+    output_ += "!! Unknown g-code state: " + name + "\n";
   } else if (command.starts_with("RESTORE_GCODE_STATE")) {
-    saved_.mesh_mm = left_over_.mesh_mm;  // no part of it
-    left_over_ = saved_, base_ = saved_base_;
+    saved_[name].first.mesh_mm = left_over_.mesh_mm;  // no part of it
+    std::tie(left_over_, base_) = saved_[name];
   } else if (command.starts_with("SET_GCODE_OFFSET")) {
     base_ = {base_.x - offset.x, base_.y - offset.y, base_.z - offset.z};
     offset = {};
@@ -146,49 +138,34 @@ void VirtualPrinter::set_position(const std::string& command) {
 
 void VirtualPrinter::run_m(int code, const std::string& command, double t) {
   const bool only_marlin =
-      code == 0 || code == 17 || code == 108 || code == 154 || code == 155 || code == 211 || code == 410;
+      code == 0 || code == 108 || code == 154 || code == 155 || code == 211 || code == 410;
   if (klipper() && only_marlin) return unknown(command);
   executed_.push_back({t, command});
   if (run_state(code, command)) return;
-  switch (code) {
-    case 0:
-      return pause(command, t);
-    case 105:
-      ok_text_ = " T:25.00 /0.00 B:25.00 /0.00 @:0 B@:0";
-      return;
-    case 154:
-      if (settings_.deaf_to_m154) return;
-      return report_every(parameter(command, "S").value_or(position_every_), temperature_every_);
-    case 155:
-      return report_every(position_every_, parameter(command, "S").value_or(temperature_every_));
-    case 110:
-    case 17:
-    case 84:
-    case 108:
-      return;
-    case 112:
-      return kill(t, "echo:M112 Shutdown\n");
-    case 114:
-      return report(settings_.realtime_position && command.find('R') != std::string::npos ? motion_.at(t)
-                                                                                          : motion_.target());
-    case 115:
-      if (klipper()) {
-        ok_text_ = " FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.12.0-virtual";
-        return;
-      }
-      output_ += marlin_capabilities(settings_.emergency_parser);
-      return;
-    case 400: {
-      const double end = std::max(t, motion_.end_time());
-      return block_until(klipper() ? t + 0.1 * std::ceil((end - t) / 0.1) : end, t);
-    }
-    case 410:
-      if (settings_.emergency_parser) return;  // it has acted when it came
-      motion_.stop(t);
-      return block_until(t + settings_.quick_stop_s, t);
-    default:
-      executed_.pop_back();
-      unknown(command);
+  if (code == 0) return pause(command, t);
+  if (code == 112) return kill(t, "echo:M112 Shutdown\n");
+  if (code == 114)
+    return report(settings_.realtime_position && command.find('R') != std::string::npos ? motion_.at(t)
+                                                                                        : motion_.target());
+  if (code == 154 && !settings_.deaf_to_m154)
+    return report_every(parameter(command, "S").value_or(position_every_), temperature_every_);
+  if (code == 155) return report_every(position_every_, parameter(command, "S").value_or(temperature_every_));
+  if (code == 400) {
+    const double end = std::max(t, motion_.end_time());
+    return block_until(klipper() ? t + 0.1 * std::ceil((end - t) / 0.1) : end, t);
+  }
+  if (code == 410 && !settings_.emergency_parser) {  // else it has acted when it came
+    motion_.stop(t);
+    return block_until(t + settings_.quick_stop_s, t);
+  }
+  if (code == 105) {
+    ok_text_ = " T:25.00 /0.00 B:25.00 /0.00 @:0 B@:0";
+  } else if (code == 115) {
+    (klipper() ? ok_text_ : output_) += klipper() ? " FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.12.0-virtual"
+                                                  : marlin_capabilities(settings_.emergency_parser);
+  } else if (code != 108 && code != 110 && code != 154 && code != 410) {
+    executed_.pop_back();
+    unknown(command);
   }
 }
 
@@ -257,9 +234,9 @@ void VirtualPrinter::automatic_report(double t) {
   }
 }
 
-// M0 needs somebody who can answer: a display's button, or M108 through the emergency parser.
+// M0 needs somebody who can answer: here M108 through the emergency parser.
 void VirtualPrinter::pause(const std::string& command, double t) {
-  if (!settings_.display && !settings_.emergency_parser) {
+  if (!settings_.emergency_parser) {
     executed_.pop_back();
     unknown(command);
     return;
@@ -284,7 +261,7 @@ void VirtualPrinter::overheat(double t) {
   kill(t, "Error:MAXTEMP triggered, system stopped! Heater_ID: E0\n\necho:Err: MAXTEMP\n");
 }
 
-// The compiler's buffer is kept clean for a second; whatever held the firmware ends with it.
+// The planner's buffer is kept clean for a second; whatever held the firmware ends with it.
 void VirtualPrinter::quick_stop(double t) {
   motion_.stop(t);
   if (!blocked_) repeat_after_block_ = true;
