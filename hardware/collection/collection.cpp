@@ -111,14 +111,15 @@ CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const Pos
     if (time < track.begin() || time > track.end()) continue;
     if (pass.time_s.empty() && pass.left_out == 0) before = date.missing;
     last = date.missing;
-    if (date.doubt_s() * speed > kTrustedMm) {
+    const auto [at_s, p, head_mm] = track.at(time);
+    // Where the head alone is doubted by more than that, the pass says so.
+    if (date.doubt_s() * speed + (head_mm > kTrustedMm ? 0 : head_mm) > kTrustedMm) {
       ++pass.left_out;
       continue;
     }
     pass.time_s.push_back(time - track.begin());
     const auto frame = std::span(all.signals).subspan(i * signals, signals);
     pass.signals.insert(pass.signals.end(), frame.begin(), frame.end());
-    const Point3 p = track.at(time);
     pass.position.insert(pass.position.end(), {p.x, p.y, p.z});
     pass.suspect.push_back(all.suspect[i]);
   }
@@ -165,8 +166,8 @@ std::string event_text(const PositionSample& sample) {
 
 double named_speed(double measured, double ordered) {
   if (!(measured > 0 && ordered > 0) || std::abs(measured / ordered - 1) < 0.005) return ordered;
-  const double digit = std::pow(10, std::floor(std::log10(measured)) - 2);
-  return digit * std::round(measured / digit);
+  const double exponent = std::floor(std::log10(measured)) - 2;
+  return decimal(std::round(measured / decimal(1, exponent)), exponent);
 }
 
 Sensor sensor_of(const Journal& journal) { return part_of_header(journal, "sensor", sensor_of_json); }

@@ -133,23 +133,22 @@ MoveTiming timing_of(std::span<const Leg> ended) {
       beyond(ended, [&](const Leg& l) { return in_the_air(l) && l.speed == slow; });
   if (fast_s.size() < kEnough) fast_s = beyond(ended, [](const Leg&) { return true; });
   if (fast_s.empty()) return timing;
-  const auto middle_of = [](std::vector<double> s) { return median(s); };
-  const double fast_beyond = middle_of(fast_s);
-  const auto spread = [](const std::vector<double>& s) {
-    return s.size() >= kEnough ? s[s.size() - 2] - s[1] : 0;
-  };
+  const double fast_beyond = median(std::vector(fast_s));
   double ramps = speed / timing.acceleration;
   if (slow_s.size() >= kEnough) {
-    const double slow_beyond = middle_of(slow_s), part = slow / speed;
+    const double slow_beyond = median(std::vector(slow_s)), part = slow / speed;
     const double most = std::max(0.0, fast_beyond - slow_beyond) / (1 - part);  // ramps that grow with v
     timing.range_s = 0.5 * part * most;
     ramps = most - timing.range_s;
+    // Both speeds together show how answers spread: a damaged one of a few hides nothing then.
+    for (const double s : slow_s) fast_s.push_back(s + fast_beyond - slow_beyond);
+    std::ranges::sort(fast_s);
   } else {
     timing.range_s = ramps;
   }
   timing.delay_s = fast_beyond - ramps;
   timing.acceleration = std::clamp(speed / std::max(ramps, 1e-9), 20.0, 1e5);  // mm/s^2
-  timing.spread_s = std::max(spread(fast_s), spread(slow_s));
+  if (fast_s.size() >= kEnough) timing.spread_s = fast_s[fast_s.size() - 2] - fast_s[1];
   std::vector<double> slides;
   for (const Leg& leg : ended)
     if (leg.phase == Phase::slide && leg.speed > 0)
@@ -178,7 +177,9 @@ void PositionTrack::distrust(double fastest, const PositionSample& before, const
                       : reachable(fastest, before, after) ? way - farthest
                                                           : way;
   const double when_s = 0.5 * std::max(before.round_trip_s, after.round_trip_s);
-  doubt_mm_ = std::max(doubt_mm_, away + when_s * fastest + 0.01);  // mm: both are rounded
+  points_.back().doubt_mm =
+      std::max(points_.back().doubt_mm, away + when_s * fastest + 0.01);  // mm: both are rounded
+  doubt_mm_ = std::max(doubt_mm_, points_.back().doubt_mm);
 }
 
 void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
@@ -189,7 +190,8 @@ void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
   const double off_s = took(leg) - timing.delay_s -
                        timing.slowness * trapezoid_duration(length, leg.speed, timing.acceleration);
   const double wrong_s = std::abs(off_s) + timing.spread_s + 0.5 * timing.range_s;
-  doubt_mm_ = std::max(doubt_mm_, std::min(length, wrong_s * leg.speed));
+  const double wrong_mm = std::min(length, wrong_s * leg.speed);
+  doubt_mm_ = std::max(doubt_mm_, wrong_mm);
   const double cruise_s = took(leg) - timing.delay_s - ramps;
   const bool as_ordered = std::abs(cruise_s - ordered_s(leg)) < timing.spread_s + timing.range_s;
   if (leg.phase == Phase::slide && cruise_s > 0) speed_ = as_ordered ? leg.speed : length / cruise_s;
@@ -201,6 +203,7 @@ void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
     const double part =
         length > 0 ? trapezoid_position(t, length, duration, timing.acceleration) / length : 1;
     add(start + t, between(leg.from, leg.to, part));
+    points_.back().doubt_mm = std::max(points_.back().doubt_mm, wrong_mm);
   }
 }
 
@@ -235,15 +238,16 @@ std::string PositionTrack::doubt(double trusted_mm) const {
   return doubt;
 }
 
-Point3 PositionTrack::at(double time_s) const {
+PositionTrack::Knot PositionTrack::at(double time_s) const {
   if (points_.empty()) return {};
   const auto after = std::lower_bound(points_.begin(), points_.end(), time_s,
                                       [](const Knot& knot, double t) { return knot.time_s < t; });
-  if (after == points_.begin()) return points_.front().position;
-  if (after == points_.end()) return points_.back().position;
+  if (after == points_.begin()) return points_.front();
+  if (after == points_.end()) return points_.back();
   const Knot& a = *(after - 1);
   const Knot& b = *after;
-  return between(a.position, b.position, (time_s - a.time_s) / (b.time_s - a.time_s));
+  const double part = (time_s - a.time_s) / (b.time_s - a.time_s);
+  return {time_s, between(a.position, b.position, part), b.doubt_mm};
 }
 
 }  // namespace supertac

@@ -37,7 +37,12 @@ class PositionTrack {
   /// Adds a leg's samples; without samples the leg is modelled as a trapezoid of speed that begins by
   /// `timing` and ends when M400 was answered.
   void add_leg(const Leg& leg, const std::vector<PositionSample>& samples, const MoveTiming& timing);
-  Point3 at(double time_s) const;
+  struct Knot {
+    double time_s;
+    Point3 position;
+    double doubt_mm = 0;  ///< how far the head may have been from there, and on the way to it
+  };
+  Knot at(double time_s) const;
   double begin() const { return points_.empty() ? 0 : points_.front().time_s; }
   double end() const { return points_.empty() ? 0 : points_.back().time_s; }
   std::uint64_t rejected() const { return rejected_; }
@@ -48,10 +53,6 @@ class PositionTrack {
   std::string doubt(double trusted_mm) const;
 
  private:
-  struct Knot {
-    double time_s;
-    Point3 position;
-  };
   void add(double time_s, const Point3& position);
   void model(const Leg& leg, const MoveTiming& timing);
   void distrust(double fastest, const PositionSample& before, const PositionSample& after);

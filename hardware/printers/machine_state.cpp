@@ -1,6 +1,7 @@
 #include "hardware/printers/machine_state.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <optional>
 #include <utility>
 
@@ -26,15 +27,15 @@ struct StateRule {
   bool homed = false;  // matters for a homed machine only: a confirmed origin is in the coordinates of now
 };
 
-constexpr int kMostQuestions = 6;  // at being understood
+constexpr int kMostQuestions = 6;         // at being understood
+constexpr double kGivenBackWithin = 0.5;  // s: nothing moves when a state is given back
 constexpr const char* kByHand = "set it by hand and start again";
 
 // Old and new Marlin by their answers: an old one says nothing where a new one reports, and is set all the
 // same. What else Marlin keeps between jobs moves no head that is sent absolute targets.
-// A Klipper's state cannot be read, and a complaint may be damaged as the command was: it is restored twice.
 constexpr StateRule kRules[] = {
-    {"state of another job", klipper, "SAVE_GCODE_STATE NAME=supertac", "", "", "",
-     "RESTORE_GCODE_STATE NAME=supertac;RESTORE_GCODE_STATE NAME=supertac", ""},
+    {"speed, flow and coordinates", klipper, "SAVE_GCODE_STATE NAME=supertac", "", "", "",
+     "RESTORE_GCODE_STATE NAME=supertac", ""},
     {"unit of lengths", marlin, "G21", "M503", "  G2", "1", "G20", kByHand},
     {"unit of lengths", klipper, "G21", "", "", "", nullptr, ""},
     {"absolute positions", marlin, "G90", "", "", "", "", ""},
@@ -51,7 +52,7 @@ constexpr StateRule kRules[] = {
     {"mesh compensation", klipper, "BED_MESH_CLEAR", "BED_MESH_PROFILE SAVE=supertac", "profile [supertac]",
      ", the bed has not been probed", "BED_MESH_PROFILE LOAD=supertac;BED_MESH_PROFILE REMOVE=supertac", ""},
     {"offset of the coordinates", klipper, "SET_GCODE_OFFSET X=0 Y=0 Z=0", "GET_POSITION",
-     "gcode homing: ", "X:0.000000 Y:0.000000 Z:0.000000", "", kByHand},
+     "gcode homing: ", "X:0.000000 Y:0.000000 Z:0.000000", nullptr, kByHand},
     {"home offset (M206)", marlin, "", "M503", "M206 X", "0.00 Y0.00 Z0.00", "",
      "set it to 0 (M206 X0 Y0 Z0), or confirm the origin instead of homing", true},
 };
@@ -59,20 +60,21 @@ constexpr StateRule kRules[] = {
 Dialect dialect_of(const MarlinCapabilities& firmware) { return firmware.klipper ? klipper : marlin; }
 
 /// Nothing where the firmware does not know the command.
-std::optional<MarlinLink::Answer> run(MarlinLink& link, const std::string& command) {
+std::optional<MarlinLink::Answer> run(MarlinLink& link, const std::string& command, double deadline_s = 0) {
   try {
-    return link.command(command);
+    return link.command(command, deadline_s);
   } catch (const PrinterRefused&) {
     return std::nullopt;
   }
 }
 
-/// Whether the firmware took it. Klipper is silent then: what it says may be a damaged complaint.
-bool set_by(MarlinLink& link, const std::string& command) {
-  std::optional<MarlinLink::Answer> answer = run(link, command);
-  for (int i = 1; i < kMostQuestions && link.capabilities().klipper && answer && !answer->replies.empty();
+/// Whether the firmware took it. Klipper is silent then: what it refuses may have been damaged on its way,
+/// and what it says may be a damaged complaint.
+bool set_by(MarlinLink& link, const std::string& command, double deadline_s = 0) {
+  std::optional<MarlinLink::Answer> answer = run(link, command, deadline_s);
+  for (int i = 1; i < kMostQuestions && link.capabilities().klipper && !(answer && answer->replies.empty());
        ++i)
-    answer = run(link, command);
+    answer = run(link, command, deadline_s);
   return answer.has_value();
 }
 
@@ -90,21 +92,16 @@ bool is_wanted(const std::string& value, const StateRule& rule) {
   return std::ranges::equal(value, std::string_view(rule.wanted), {}, lower, lower);
 }
 
-/// The value as two answers in a row have it: a damaged one must be neither refused nor given back.
+/// The value as two answers in a row have it: a damaged one must be neither believed nor given back.
 std::optional<std::string> value_by(MarlinLink& link, const StateRule& rule) {
   const auto value = [&] {
     const auto answer = run(link, rule.read);
     return answer ? value_in(*answer, rule.label) : std::nullopt;
   };
   std::optional<std::string> before = value();
-  for (int i = 0; i < kMostQuestions && !(before && is_wanted(*before, rule)); ++i)
+  for (int i = 0; i < kMostQuestions; ++i)
     if (const auto now = std::exchange(before, value()); now == before) break;
   return before;
-}
-
-std::string filled(std::string text, const std::string& value) {
-  if (const std::size_t at = text.find('?'); at != std::string::npos) text.replace(at, 1, value);
-  return text;
 }
 
 }  // namespace
@@ -116,15 +113,15 @@ void MachineState::set(MarlinLink& link, bool homed) {
     const std::string set = rule.set, read = rule.read, wanted = rule.wanted;
     const std::string name = rule.state + (" (" + set + ")");
     const auto known = std::ranges::find(changed_, name, &Changed::name);
-    const std::string back = rule.back == nullptr ? "" : rule.back;
+    std::string back = rule.back == nullptr ? "" : rule.back;
     if (known != changed_.end() && read.empty() && !back.empty()) continue;  // saved once
     std::optional<std::string> found;
     if (!read.empty()) found = value_by(link, rule);
     const bool another = found && !is_wanted(*found, rule);
     const bool taken = !set.empty() && set_by(link, set);
-    const bool gone = taken && (found ? another : rule.back != nullptr);
-    if (gone && known == changed_.end())
-      changed_.push_back({name, found || read.empty() ? filled(back, found.value_or("")) : ""});
+    const bool gone = taken && rule.back != nullptr && (!found || another);
+    if (const std::size_t at = back.find('?'); at != back.npos) back.replace(at, 1, found.value_or(""));
+    if (gone && known == changed_.end()) changed_.push_back({name, found || read.empty() ? back : ""});
     if (!another || *rule.if_not == 0) continue;
     if (!set.empty()) found = value_by(link, rule);
     if (!found || is_wanted(*found, rule)) continue;
@@ -140,7 +137,7 @@ void MachineState::put_back(MarlinLink& link) {
     if (changed_[i].back.empty()) continue;
     bool taken = true;
     for (const std::string_view command : split_line(changed_[i].back, ';'))
-      taken = set_by(link, std::string(command)) && taken;
+      taken = taken && set_by(link, std::string(command), kGivenBackWithin);
     if (taken) changed_.erase(changed_.begin() + static_cast<std::ptrdiff_t>(i));
   }
 }
@@ -150,23 +147,15 @@ std::string MachineState::kept() const { return joined(changed_, ", ", &Changed:
 std::optional<SoftLimits> soft_limits_of(MarlinLink& link) {
   if (dialect_of(link.capabilities()) != marlin) return std::nullopt;
   for (const Reply& reply : run(link, "M211").value_or(MarlinLink::Answer()).replies) {
-    std::string text = reply.text;  // "Soft endstops: ON  Min: X0.00 Y0.00 Z0.00  Max: X235.00 ..."
+    std::string text = reply.text;
     std::ranges::transform(text, text.begin(), lower);
-    std::size_t at = text.find("soft endstops: on");
     SoftLimits soft{{}, {}, reply.text};
-    for (const auto& [axis, value] : {std::pair('x', &soft.low.x),
-                                      {'y', &soft.low.y},
-                                      {'z', &soft.low.z},
-                                      {'x', &soft.high.x},
-                                      {'y', &soft.high.y},
-                                      {'z', &soft.high.z}}) {
-      at = text.find(axis, axis == 'x' ? text.find(':', at) : at);
-      if (at == std::string::npos) break;
-      const auto number = parse_double(std::string_view(text).substr(at + 1, text.find(' ', at) - at - 1));
-      if (!number) at = std::string::npos;
-      *value = number.value_or(0);
-    }
-    if (at != std::string::npos) return soft;
+    Point3 &low = soft.low, &high = soft.high;
+    const std::size_t at = text.find("soft endstops: on");
+    if (at != std::string::npos &&
+        std::sscanf(text.c_str() + at, "soft endstops: on min: x%lf y%lf z%lf max: x%lf y%lf z%lf", &low.x,
+                    &low.y, &low.z, &high.x, &high.y, &high.z) == 6)
+      return soft;
   }
   return std::nullopt;
 }

@@ -107,22 +107,25 @@ bool MarlinLink::probe(double until) {
 }
 
 void MarlinLink::read_capabilities() {
-  bool known = false;  // what it has for a parser
-  for (int attempt = 0; attempt < 2 && !known; ++attempt) {
+  // Damage makes no known name of another one: a name that is none is asked for again.
+  constexpr std::string_view kName = "FIRMWARE_NAME:";
+  std::string& firmware = capabilities_.firmware;
+  bool marlin = false, parser = false;
+  for (int attempt = 0; attempt < 6 && !(marlin && parser) && !capabilities_.klipper; ++attempt) {
     for (const Reply& reply : command("M115").replies) {
-      constexpr std::string_view kName = "FIRMWARE_NAME:";
-      const std::size_t at = reply.text.find(kName);
-      if (at != std::string::npos)
-        capabilities_.firmware = trimmed(std::string_view(reply.text).substr(at + kName.size()));
-      known = known || reply.text.starts_with("Cap:EMERGENCY_PARSER:");
+      if (const std::size_t at = reply.text.find(kName); at != std::string::npos && !marlin) {
+        const std::string_view rest = trimmed(std::string_view(reply.text).substr(at + kName.size()));
+        const std::size_t next = rest.find(':');  // of what is told behind it
+        firmware = next == rest.npos ? rest : rest.substr(0, rest.rfind(' ', next));
+      }
+      parser = parser || reply.text.starts_with("Cap:EMERGENCY_PARSER:");
       if (reply.text == "Cap:EMERGENCY_PARSER:1") capabilities_.emergency_parser = true;
     }
-    capabilities_.klipper = capabilities_.firmware.starts_with("Klipper");
-    if (capabilities_.firmware.starts_with("RepRapFirmware"))
-      refuse("RepRapFirmware",
-             "says ok to a line that a cable has damaged, and has no M410 to stop in contact");
-    known = known || !capabilities_.quick_stop();
+    marlin = firmware.find("Marlin") != std::string::npos;
+    capabilities_.klipper = firmware.starts_with("Klipper");
   }
+  if (!marlin && !capabilities_.klipper)
+    refuse((firmware.empty() ? "none" : in_quotes(firmware)) + " as its name (M115)", "is neither");
 }
 
 }  // namespace supertac

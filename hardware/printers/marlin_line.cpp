@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <initializer_list>
 #include <stdexcept>
 
 #include "io/numbers/numbers.h"
@@ -14,6 +15,10 @@ namespace {
 
 bool contains(std::string_view text, std::string_view part) {
   return text.find(part) != std::string_view::npos;
+}
+
+bool contains_one(std::string_view text, std::initializer_list<std::string_view> parts) {
+  return std::ranges::any_of(parts, [text](std::string_view part) { return contains(text, part); });
 }
 
 std::optional<std::int64_t> number_after(std::string_view text, std::string_view label) {
@@ -52,51 +57,39 @@ std::optional<Point3> position_in(std::string_view text) {
 // What a firmware says when it runs nothing any more. A heater's error alone is none of these: the machine
 // may go on, and where it does not, it says so.
 bool is_fatal(std::string_view text) {
-  for (const std::string_view mark : {"kill() called", "Printer halted", "system stopped", "Printer stopped",
-                                      "Printer is shutdown", "Shutdown due to"}) {
-    if (contains(text, mark)) return true;
-  }
-  return false;
+  return contains_one(text, {"kill() called", "Printer halted", "system stopped", "Printer stopped",
+                             "Printer is shutdown", "Shutdown due to"});
 }
 
 bool is_of_a_heater(std::string_view text) {
-  for (const std::string_view mark :
-       {"Heater", "Heating failed", "MAXTEMP", "MINTEMP", "Thermal", "THERMAL", "temperature"}) {
-    if (contains(text, mark)) return true;
-  }
-  return false;
+  return contains_one(
+      text, {"Heater", "Heating failed", "MAXTEMP", "MINTEMP", "Thermal", "THERMAL", "temperature"});
 }
 
-// "//action:cancel", which some firmwares write with a blank: that the printer was stopped or paused.
+// "//action:cancel", which some firmwares write with blanks and some as "print_abort": that the printer was
+// stopped or paused. It is said unasked, so it may begin in the middle of another line.
 bool is_interruption(std::string_view line) {
-  if (!line.starts_with("//")) return false;
-  line.remove_prefix(std::min(line.size(), line.find_first_not_of(' ', 2)));
   constexpr std::string_view kAction = "action:";
-  if (!line.starts_with(kAction)) return false;
-  line.remove_prefix(std::min(line.size(), line.find_first_not_of(' ', kAction.size())));
-  const std::string_view verb = line.substr(0, line.find(' '));
-  for (const std::string_view end :
-       {"cancel", "pause", "paused", "out_of_filament", "poweroff", "disconnect", "shutdown"}) {
-    if (verb == end) return true;
-  }
-  return false;
+  const std::size_t at = line.find(kAction);
+  if (at == std::string_view::npos || !trimmed(line.substr(0, at)).ends_with("//")) return false;
+  line.remove_prefix(std::min(line.size(), line.find_first_not_of(' ', at + kAction.size())));
+  return contains_one(line.substr(0, line.find(' ')),
+                      {"cancel", "pause", "stop", "abort", "kill", "out_of_filament", "runout", "poweroff",
+                       "disconnect", "shutdown"});
 }
 
 // Of a boot banner: any of its lines that no firmware in use says, for "start" itself may be lost.
 bool is_banner(std::string_view line) {
-  for (const std::string_view mark :
-       {"start", "PowerUp", "External Reset", "Brown out Reset", "Watchdog Reset", "Software Reset",
-        "// Klipper state: Ready", "// Klipper state: Disconnect"}) {
-    if (line == mark) return true;
-  }
-  return line.starts_with("Marlin ") || line.starts_with("echo:Marlin ");
+  constexpr std::string_view kLines[] = {
+      "start",          "PowerUp",        "External Reset",          "Brown out Reset",
+      "Watchdog Reset", "Software Reset", "// Klipper state: Ready", "// Klipper state: Disconnect"};
+  return std::ranges::count(kLines, line) > 0 || line.starts_with("Marlin ") ||
+         line.starts_with("echo:Marlin ");
 }
 
 Reply error_reply(std::string_view text) {
-  if (is_fatal(text)) return {ReplyKind::fatal, {}, {}, std::string(text)};
   if (is_of_a_heater(text)) return {ReplyKind::other, {}, {}, std::string(text)};
-  const bool line_fault = contains(text, "checksum") || contains(text, "Checksum") ||
-                          contains(text, "Line Number") || contains(text, "Last Line");
+  const bool line_fault = contains_one(text, {"checksum", "Checksum", "Line Number", "Last Line"});
   return {line_fault ? ReplyKind::line_fault : ReplyKind::error,
           number_after(text, "Last Line:"),
           {},
@@ -145,15 +138,15 @@ Reply parse_reply(std::string_view line) {
   const auto kind = [line](ReplyKind k, std::optional<std::int64_t> number = {}) {
     return Reply{k, number, {}, std::string(line)};
   };
+  if (is_interruption(line)) return kind(ReplyKind::interrupted);
+  if (is_fatal(line)) return kind(ReplyKind::fatal);
   if (line == "ok" || line.starts_with("ok ")) return kind(ReplyKind::ok);
   if (is_banner(line)) return kind(ReplyKind::start);
-  if (is_interruption(line)) return kind(ReplyKind::interrupted);
   if (line == "wait") return kind(ReplyKind::wait);
   if (line.starts_with("Resend:")) return kind(ReplyKind::resend, number_after(line, "Resend:"));
   if (line.starts_with("rs ")) return kind(ReplyKind::resend, number_after(line, "rs "));
   if (line.starts_with("Error:")) return error_reply(line);
-  if (is_fatal(line)) return kind(ReplyKind::fatal);
-  if (line.starts_with("echo:busy: paused")) return kind(ReplyKind::paused);
+  if (contains(line, "echo:busy: paused")) return kind(ReplyKind::paused);
   if (line.starts_with("echo:busy:")) return kind(ReplyKind::busy);
   if (line.starts_with("echo:Unknown command") || line.starts_with("// Unknown command"))
     return kind(ReplyKind::unknown_command);

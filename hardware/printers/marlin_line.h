@@ -42,7 +42,7 @@ enum class ReplyKind {
   unknown_command,  ///< acknowledged but not run
   busy,             ///< echo:busy: processing
   paused,           ///< echo:busy: paused for user
-  interrupted,      ///< //action:cancel, pause and their like: stopped at its display, or by itself
+  interrupted,      ///< //action:cancel or its like, also within a line: stopped at its display, or by itself
   start,            ///< the firmware restarted: a line of its banner
   wait,             ///< heartbeat of an idle firmware
   position,         ///< M114, or M154's report of the queue's end

@@ -50,7 +50,6 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
   kept_.push_back(numbered_line(number_ + 1, text));
   ++number_;
   if (kept_.size() > kKeptLines) kept_.pop_front();
-  ++counters_.lines;
   Exchange exchange{number_, number_, deadline_s > 0 ? deadline_s : kOkDeadline};
   exchange.code = text;
   exchange.once = capabilities_.klipper && code.starts_with("G1 ");

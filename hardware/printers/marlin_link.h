@@ -21,7 +21,7 @@ namespace supertac {
 
 /// Firmware facts from M115.
 struct MarlinCapabilities {
-  std::string firmware;           ///< the text of FIRMWARE_NAME, empty when not told
+  std::string firmware;           ///< the text of FIRMWARE_NAME
   bool emergency_parser = false;  ///< M112, M410 act ahead of the queue
   bool klipper = false;           ///< never asks for a line again, has no M410 and no M114 R
   bool quick_stop() const { return !klipper; }
@@ -30,7 +30,6 @@ struct MarlinCapabilities {
 class MarlinLink {
  public:
   struct Counters {
-    std::uint64_t lines = 0;     ///< different lines sent
     std::uint64_t repeats = 0;   ///< lines sent again
     std::uint64_t timeouts = 0;  ///< answers that did not come in time
     std::uint64_t faults = 0;    ///< damaged lines reported by the firmware

@@ -17,18 +17,8 @@ constexpr int kClaims = 3;  // of having arrived at once, before a firmware is t
 }  // namespace
 
 const char* name_of(Phase phase) {
-  switch (phase) {
-    case Phase::approach:
-      return "approach";
-    case Phase::onset:
-      return "onset";
-    case Phase::slide:
-      return "slide";
-    case Phase::release:
-      return "release";
-    default:
-      return "reposition";
-  }
+  constexpr const char* kNames[] = {"approach", "onset", "slide", "release", "reposition"};
+  return kNames[static_cast<std::size_t>(phase)];
 }
 
 bool reachable(double speed, const PositionSample& from, const PositionSample& to) {

@@ -45,7 +45,7 @@ void Printer::connect() {
 
 std::string Printer::put_back() {
   try {
-    link_.set_watch(nullptr);  // nothing ends it but its bound
+    link_.set_watch(nullptr), link_.answer_pauses();  // nothing ends it but its bound
     link_.give_up_at(link_.port().now() + kStopDeadline);
     if (link_.in_use()) state_.put_back(link_);
   } catch (const HardwareError&) {  // nobody is there to put it back
@@ -214,13 +214,13 @@ bool Printer::stands_still() {
 Printer::Stop Printer::quick_stop() {
   const bool ends_its_move = !link_.capabilities().quick_stop();
   Stop stop;
-  stop.ahead_of_queue = link_.capabilities().emergency_parser;
+  const bool parser = link_.capabilities().emergency_parser;
   try {
     if (!ends_its_move) link_.emergency("M410");
     link_.settle();
     const bool stands = ends_its_move || stands_still();
     // The position of the queue is that of the head only once nothing moves any more.
-    link_.command("M400", stop.ahead_of_queue ? kStopDeadline : longest_s());
+    link_.command("M400", parser ? kStopDeadline : longest_s());
     target_ = agreed_position();
     expected_seconds_ = 0;
     stop.confirmed = stands;
@@ -233,7 +233,7 @@ Printer::Stop Printer::quick_stop() {
   }
   stop.text = stop.confirmed ? "the head stands still"
                              : "the head could not be shown to stand still; switch the printer off";
-  if (!stop.ahead_of_queue && !ends_its_move)
+  if (!parser && !ends_its_move)
     stop.text +=
         " (this firmware has no emergency parser: a stop acts when its line is read, not before an M400 "
         "ends)";
@@ -242,7 +242,6 @@ Printer::Stop Printer::quick_stop() {
 
 Printer::Stop Printer::emergency_stop() {
   Stop stop;
-  stop.ahead_of_queue = link_.capabilities().emergency_parser;
   origin_ = Origin::unknown;
   try {
     for (const double until = link_.port().now() + kStopDeadline; link_.port().now() < until;) {
@@ -256,7 +255,8 @@ Printer::Stop Printer::emergency_stop() {
   } catch (const HardwareError& error) {
     stop.text = error.what();
   }
-  if (!stop.confirmed && !stop.ahead_of_queue) stop.text += " (this firmware has no emergency parser)";
+  if (!stop.confirmed && !link_.capabilities().emergency_parser)
+    stop.text += " (this firmware has no emergency parser)";
   return stop;
 }
 

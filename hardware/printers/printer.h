@@ -27,9 +27,8 @@ class Printer {
  public:
   enum class Origin { unknown, confirmed, homed };
   struct Stop {
-    bool confirmed = false;       ///< the head was shown to stand still
-    bool ahead_of_queue = false;  ///< the firmware has an emergency parser
-    std::string text;             ///< one line for the operator
+    bool confirmed = false;  ///< the head was shown to stand still
+    std::string text;        ///< one line for the operator
   };
 
   /// `port` must outlive the printer.

@@ -28,10 +28,12 @@ class ScriptedFirmware : public Port {
     answer_.erase(0, count);
     return {count, time_ += 1e-3};
   }
-  double write(std::span<const std::byte>, double) override {
+  double write(std::span<const std::byte> bytes, double) override {
     ++writes_;
+    const std::string_view line(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     if (polite_ > 0) {
       --polite_;
+      if (line.find("M115") != line.npos) answer_ += "FIRMWARE_NAME:Marlin\nCap:EMERGENCY_PARSER:0\n";
       answer_ += "ok\n";
       return time_ += 1e-3;
     }

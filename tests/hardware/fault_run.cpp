@@ -20,10 +20,7 @@ constexpr double kLongestRun = 3600;
 
 std::vector<std::string> planned_moves(const PalpationPlan& plan, const Point3& origin) {
   std::vector<std::string> moves;
-  for (const Leg& leg : legs_of(plan, origin)) {
-    moves.push_back("G1 X" + format(leg.to.x, 3) + " Y" + format(leg.to.y, 3) + " Z" + format(leg.to.z, 3) +
-                    " F" + format(60 * leg.speed, 1));
-  }
+  for (const Leg& leg : legs_of(plan, origin)) moves.push_back(move_command(leg.to, leg.speed));
   return moves;
 }
 
@@ -144,19 +141,23 @@ std::string check_finger(const PalpationOutcome& outcome, SimulatedRig& rig, con
   return {};
 }
 
-// What a firmware has at the end: all but what it is said to keep; nothing when it restarted before the run.
+// What a firmware has at the end: all but what it is said to keep, where it does, for the answer to what gave
+// it back may have been lost; nothing when it restarted before the run.
 LeftOver put_back(const RigSettings& rig, const LeftOver& now, const std::string& kept) {
   const VirtualPrinterSettings& printer = rig.printer;
   LeftOver left = printer.left_over;
   if (rig.faults.reset_rate > 0 && now == LeftOver{}) return now;
-  const auto stays = [&](const char* name) { return kept.find(name) != std::string::npos; };
-  if (stays("mesh compensation")) left.mesh_mm = now.mesh_mm;
-  if (stays("absolute positions")) left.relative = false;
-  if (stays("unit of lengths")) left.inches = false;
-  if (stays("speed factor")) left.speed_percent = 100;
-  if (stays("flow factor")) left.flow_percent = 100;
-  if (printer.firmware != Firmware::klipper) left.offset = {};
-  if (printer.firmware == Firmware::klipper) left.home_offset = {};
+  const auto either = [&](const char* name, auto member, auto set) {
+    if (kept.find(name) != kept.npos && now.*member == set) left.*member = set;
+  };
+  if (kept.find("speed, flow and coordinates") != kept.npos)
+    left = now, left.mesh_mm = printer.left_over.mesh_mm;
+  either("mesh compensation", &LeftOver::mesh_mm, now.mesh_mm);
+  either("absolute positions", &LeftOver::relative, false);
+  either("unit of lengths", &LeftOver::inches, false);
+  either("speed factor", &LeftOver::speed_percent, 100.0);
+  either("flow factor", &LeftOver::flow_percent, 100.0);
+  (printer.firmware == Firmware::klipper ? left.home_offset : left.offset) = {};
   return left;
 }
 
@@ -254,6 +255,7 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
     // A damaged move that passed as right goes elsewhere, and nobody can know.
     if (verdict.altered.empty() && verdict.broken.empty())
       verdict.broken = check_box(legs, board, 0.1 + std::abs(rig_settings.printer.left_over.mesh_mm));
+    rig.run_for(3);  // a firmware that stands still has taken lines that it will run
     if (verdict.complete && verdict.altered.empty() && verdict.broken.empty() &&
         rig.world().printer().left_over() !=
             put_back(rig_settings, rig.world().printer().left_over(), report.kept))

@@ -65,6 +65,12 @@ TEST(Collection, NothingMovesBeforeTheBoardIsHeard) {
   EXPECT_EQ(bench.folder.entries(), 0U) << "a journal of nothing was left behind";
 }
 
+TEST(Collection, ASpeedIsNamedByThreeDigits) {
+  for (const double named : {0.301, 10.2, 14.3, 30.2, 149.0, 1230.0})
+    EXPECT_EQ(named_speed(named * 1.0001, 10), named);
+  EXPECT_EQ(named_speed(10.04, 10), 10);
+}
+
 TEST(Collection, WhatWasSetIsPutBackWhereverTheRunEnds) {
   for (const bool stopped : {false, true}) {
     CollectionBench bench(running_rig({.left_over = {.speed_percent = 150}}));

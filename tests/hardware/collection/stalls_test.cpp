@@ -90,6 +90,15 @@ TEST(Stalls, KlippersCollectionIsCompleteAndSaysWhatItsM400IsWorth) {
   EXPECT_LT(klipper.worst_mm, 1.5);
 }
 
+// Of six moves a speed; damage has made the second early answer of each a late one.
+TEST(Stalls, ADamagedAnswerDoesNotHideHowFarTheOthersLieApart) {
+  std::vector<Leg> legs = {{1, Phase::slide, {}, {0, 40, 0}, 5, 0, 8.3}};
+  for (const double speed : {5.0, 1.25})
+    for (const double more_s : {0.303, 0.303, 0.268, 0.319, 0.333, 0.333})
+      legs.push_back({1, Phase::approach, {}, {0, speed, 0}, speed, 0, 1 + more_s});
+  EXPECT_NEAR(timing_of(legs).spread_s, 0.065, 0.001);
+}
+
 struct Tally {
   int silent = 0, doubted = 0, right = 0, incomplete = 0;
   void run(const RigSettings& rig, double speed) {

@@ -45,6 +45,9 @@ TEST(MachineState, ADamagedAnswerIsNeitherRefusedNorPutBack) {
     EXPECT_TRUE(bench.port.from_printer.empty());
     EXPECT_EQ(bench.firmware().left_over(), LeftOver{}) << said;
   }
+  PrinterBench bench(running_rig({.left_over = {.inches = true}}), {{"  G20 ;", "  G21 ;"}});
+  bench.printer.put_back();
+  EXPECT_TRUE(bench.firmware().left_over().inches);
 }
 
 TEST(MachineState, WhatIsNotPutBackIsSaid) {
@@ -52,6 +55,11 @@ TEST(MachineState, WhatIsNotPutBackIsSaid) {
   EXPECT_EQ(marlin.printer.put_back(),
             "absolute positions (G90), reports of position (M154 S0), reports of temperature (M155 S0)");
   EXPECT_EQ(marlin.firmware().left_over().speed_percent, 150);
+  PrinterBench paused(running_rig({.left_over = {.speed_percent = 150, .flow_percent = 80}}),
+                      {{"X:", "X:"}, {"ok\n", "//action:pause\n"}, {"ok\n", "o\n"}});
+  (void)paused.printer.queue_position();
+  (void)paused.printer.put_back();
+  EXPECT_EQ(paused.firmware().left_over(), (LeftOver{.speed_percent = 150, .flow_percent = 80}));
   PrinterBench klipper(running_rig({.firmware = Firmware::klipper, .left_over = {.mesh_mm = 0.46}}));
   EXPECT_EQ(klipper.printer.put_back(), "");
   PrinterBench gone(running_rig({.left_over = {.mesh_mm = 0.46}}));
@@ -69,12 +77,27 @@ TEST(MachineState, WhatStaysAnotherIsRefusedByName) {
       "by hand");
 }
 
-TEST(MachineState, RepRapFirmwareIsRefusedByName) {
-  const std::vector<Tampering::Change> named(
-      2, {"FIRMWARE_NAME:Marlin 2.1.2", "FIRMWARE_NAME: RepRapFirmware for Duet 2 WiFi/Ethernet"});
-  EXPECT_ERROR(
-      PrinterBench(running_rig(), named), WrongDevice,
-      "expected Marlin or Klipper, found RepRapFirmware, which says ok to a line that a cable has damaged");
+TEST(MachineState, AFirmwareIsKnownByAnUndamagedNameOrRefused) {
+  const Tampering::Change damaged{"FIRMWARE_NAME:Marlin", "FIRMWARE_NAME: RepRapFi2mware SOURCE:"},
+      other{"FIRMWARE_NAME:Marlin", "FIRMWARE_NAME: RepRapFirmware for Duet 2"},
+      klipper{":Klipper", ":Klippdr"};
+  EXPECT_ERROR(PrinterBench(running_rig(), {damaged, damaged, other, other, other, other}), WrongDevice,
+               "expected Marlin or Klipper, found 'RepRapFirmware for Duet 2");
+  const RigSettings rig = running_rig({.firmware = Firmware::klipper});
+  EXPECT_TRUE(PrinterBench(rig, {klipper, klipper}).printer.link().capabilities().klipper);
+  EXPECT_ERROR(PrinterBench(rig, std::vector(6, klipper)), WrongDevice,
+               "found 'Klippdr' as its name (M115), which is neither");
+}
+
+TEST(MachineState, WhatAKlipperRefusesIsSaidAgain) {
+  const LeftOver left{.relative = true, .speed_percent = 150, .mesh_mm = 0.46, .offset = {0, 0, -0.35}};
+  PrinterBench bench(running_rig({.firmware = Firmware::klipper, .left_over = left}));
+  bench.port.to_printer = {{"LOAD=supertac", "LOAD=supertab"}, {"NAME=supertac", "NAME=supertab"}};
+  EXPECT_EQ(bench.printer.put_back(), "");
+  EXPECT_TRUE(bench.port.to_printer.empty());
+  EXPECT_EQ(bench.firmware().left_over(), left);
+  bench.firmware().reset(bench.rig.now());
+  EXPECT_ERROR(bench.printer.link().idle(1), PrinterReset, "it said '// Klipper state: Disconnect'");
 }
 
 TEST(MachineState, AHomeOffsetIsRefusedByNameWhereItShiftsTheBed) {
@@ -148,7 +171,8 @@ struct Interrupted {
 
 TEST(MachineState, WhatTheDisplaySaysEndsTheRunFingerUp) {
   for (const char* said : {"//action:cancel", "// action:cancel", "//action:pause", "//action:paused",
-                           "//  action: out_of_filament T0"}) {
+                           "//  action: out_of_filament T0", "//action:stop", "//action:print_abort",
+                           "X:1.00 //action:cancel", "ok P15 // action:cancelled"}) {
     Interrupted run({}, [said](PrinterBench& bench) { bench.firmware().inject(std::string(said) + "\n"); });
     EXPECT_EQ(run.outcome.finger, PalpationOutcome::Finger::lifted) << run.outcome.note;
     EXPECT_ERROR(std::rethrow_exception(run.outcome.error), PrinterPaused, "action:");

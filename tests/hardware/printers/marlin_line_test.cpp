@@ -83,6 +83,11 @@ TEST(MarlinLine, RepliesAreClassified) {
   EXPECT_EQ(parse_reply("echo:busy: paused for user").kind, ReplyKind::paused);
   EXPECT_EQ(parse_reply("echo:Unknown command: \"1 G1\"").kind, ReplyKind::unknown_command);
   EXPECT_EQ(parse_reply("start").kind, ReplyKind::start);
+  // Said unasked, in the middle of an answer.
+  EXPECT_EQ(parse_reply("ok N3 Error:Printer halted. kill() called!").kind, ReplyKind::fatal);
+  EXPECT_EQ(parse_reply("X:1.00 echo:busy: paused for user").kind, ReplyKind::paused);
+  for (const char* said : {"//action:resumed", "//action:notification stop", "echo:action:cancel", "ok"})
+    EXPECT_NE(parse_reply(said).kind, ReplyKind::interrupted) << said;
   EXPECT_EQ(parse_reply("wait").kind, ReplyKind::wait);
 }
 
