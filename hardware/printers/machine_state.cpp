@@ -92,15 +92,15 @@ bool is_wanted(const std::string& value, const StateRule& rule) {
   return std::ranges::equal(value, std::string_view(rule.wanted), {}, lower, lower);
 }
 
-/// The value as two answers in a row have it: a damaged one must be neither believed nor given back.
+/// The value as three answers in a row have it: a damaged one must be neither believed nor given back.
 std::optional<std::string> value_by(MarlinLink& link, const StateRule& rule) {
   const auto value = [&] {
     const auto answer = run(link, rule.read);
     return answer ? value_in(*answer, rule.label) : std::nullopt;
   };
   std::optional<std::string> before = value();
-  for (int i = 0; i < kMostQuestions; ++i)
-    if (const auto now = std::exchange(before, value()); now == before) break;
+  for (int i = 0, same = 1; i < kMostQuestions && same < 3; ++i)
+    same = std::exchange(before, value()) == before ? same + 1 : 1;
   return before;
 }
 

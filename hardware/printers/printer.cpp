@@ -245,7 +245,7 @@ Printer::Stop Printer::emergency_stop() {
   origin_ = Origin::unknown;
   try {
     for (const double until = link_.port().now() + kStopDeadline; link_.port().now() < until;) {
-      link_.emergency("M112");  // again: a damaged one is none
+      link_.emergency("M112\nM112");  // and again: a damaged one is none
       link_.idle(kPrompt);
     }
     stop.text = "no answer to the emergency stop; switch the printer off";
