@@ -119,9 +119,9 @@ float Scaling::operator()(float signals) const {
 
 void Scaling::operator()(std::span<float> signals) const {
   // The same in the form that the compiler makes vectors of.
-  const double rest = this->rest, span = this->span;
+  const double zero = rest, width = span;
   for (float& v : signals)
-    v = static_cast<float>(std::min(std::max((rest - static_cast<double>(v)) / span, 0.0), 1.0));
+    v = static_cast<float>(std::min(std::max((zero - static_cast<double>(v)) / width, 0.0), 1.0));
 }
 
 void FrameMean::clear() {
