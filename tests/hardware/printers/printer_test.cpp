@@ -72,10 +72,12 @@ TEST(Printer, ADamagedLineOfKlippersIsStoppedBeforeItMoves) {
 }
 
 TEST(Printer, ALineThatKlipperDidNotRunIsSentAgain) {
-  for (const auto& [sent, came] : {std::pair("G1 X120", "P1 X120"), {"G1 X120", "G1\nX120"}}) {
+  for (const auto& [sent, came] :
+       {std::pair("G1 X120", "P1 X120"), {"G1 X120", "G1\nX120"}, {"M400", "M40"}}) {
     PrinterBench bench(running_rig({.firmware = Firmware::klipper}));
     bench.printer.confirm_origin(kMounted);
     bench.port.to_printer = {{sent, came}};
+    if (*sent == 'M') bench.port.from_printer = {{"Unknown command", "Unknown comman"}};
     bench.printer.start_move({120, 110, 131.81}, 20);
     bench.printer.finish_move();
     EXPECT_LT(distance(bench.head(), {120, 110, 131.81}), 1e-6);
