@@ -99,7 +99,9 @@ void declare(Arguments& a) {
       .flag("probe",
             "listen to --sensor FILE, or to an address such as serial:/dev/ttyACM0@115200, udp::PORT, "
             "tcp:HOST:PORT, for --seconds (5), say what comes, and write a sensor's file to --out; with "
-            "--web the array is shown then: press a taxel, and see which one lights up")
+            "--web the array is shown then: press a taxel, and see which one lights up; pressing all of them "
+            "in "
+            "turn writes the file's order")
       .flag("gain",
             "with --probe: find the gain of each taxel as well, which you press about equally hard (30 s)");
   declare_web(a);
@@ -188,7 +190,8 @@ int run(Arguments& a) {
                           .plate = a.text("plate"),
                           .map = a.output("map"),
                           .view = !a.quiet() && drawable_terminal()};
-  if (probed) settings.found = probed->says;
+  if (probed)
+    settings.found = probed->says, settings.draft = probed->draft, settings.draft_file = a.text("out");
   if (a.given("seconds") && !probed) settings.seconds = a.number("seconds", 0.001, 1e9);
   const std::string origin = source_of(a);
   if (a.given("elements"))

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/stream/live_frame.h"
+#include "apps/stream/pressed_order.h"
 #include "data/map/map_file.h"
 
 namespace supertac {
@@ -25,6 +26,7 @@ struct LiveState {
   double top = 0;             ///< what 1 is, in the sensor's unit from rest
   std::string unit = {};      ///< of top
   std::optional<ChangedSignal> most_changed;
+  PressedOrder::Status order = {};
   bool draws = true;               ///< there is a model
   std::vector<float> picture;      ///< [rows * scale][columns * scale]; empty before the first
   std::vector<float> half_widths;  ///< the same, as LiveFrame

@@ -56,6 +56,15 @@ std::optional<ChangedSignal> RawArray::most_changed() const {
   return most;
 }
 
+std::vector<double> RawArray::loads() const {
+  std::vector<double> loads(static_cast<std::size_t>(array_.taxels()));
+  for (std::size_t s = 0; s < rest_.size(); ++s) {
+    double& load = loads[s / static_cast<std::size_t>(array_.channels)];
+    load = std::hypot(load, newest_mean_[s] - rest_[s]);
+  }
+  return loads;
+}
+
 std::vector<float> RawArray::taxels() const {
   std::vector<float> values(static_cast<std::size_t>(array_.taxels()));
   for (std::size_t k = 0; k < values.size(); ++k)

@@ -25,6 +25,8 @@ class RawArray {
   /// The signal that is farthest from its rest, either way: where the finger is, also when polarity or order
   /// are wrong. Empty when none is a twentieth of the stated range away.
   std::optional<ChangedSignal> most_changed() const;
+  /// Of each taxel how far it is from its rest, either way, as a mean over the last moments (kRestS).
+  std::vector<double> loads() const;
 
  private:
   static constexpr double kRestS = 0.2, kForgetS = 20, kLeastTop = 0.05;

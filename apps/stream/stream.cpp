@@ -58,12 +58,14 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   about_lines_ = about_lines(source.array(), source.signal_scale().unit, format.image);
   if (!settings.web) return;
   recorder_ = std::make_unique<Recorder>(signals, recording_);
+  if (settings.draft)
+    order_ = std::make_unique<PressedOrder>(*settings.draft, source.silent(), settings.draft_file);
   web_ = std::make_unique<WebView>(
       *settings.web,
       WebSource{settings.badge, settings.source, source.array(), state_.scale, format.half_widths,
                 state_.unit, state_.draws, maker_ ? maker_->delay_s() : 0, source.silent(), settings.found,
                 [this](MapCells cells) { return named(std::move(cells)); }},
-      *recorder_);
+      *recorder_, order_.get());
 }
 
 // The next pass of this plate in the folder.
@@ -226,6 +228,7 @@ bool Stream::take(SensorFrame frame) {
   const bool rezero = web_ && web_->take_rezero();
   raw_.push(frame.signals);
   if (rezero) raw_.rezero();
+  if (order_) order_->push(raw_.loads());
   if (rezero && maker_) maker_->rezero();
   if (record_ || recorder_ || !maker_) keep_raw(frame);
   if (!maker_) return true;
@@ -314,6 +317,7 @@ void Stream::show() {
   }
   if (frames_ > 0)
     state_.taxels = raw_.taxels(), state_.top = raw_.top(), state_.most_changed = raw_.most_changed();
+  if (order_) state_.order = order_->status();
   if (view_) view_->update(state_);
   if (web_ && web_->update(state_, map_ ? &*map_ : nullptr, changed_)) changed_ = {};
 }

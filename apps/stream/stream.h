@@ -12,6 +12,7 @@
 #include "apps/stream/latency_histogram.h"
 #include "apps/stream/picture_log.h"
 #include "apps/stream/picture_maker.h"
+#include "apps/stream/pressed_order.h"
 #include "apps/stream/raw_array.h"
 #include "apps/stream/views/line_output.h"
 #include "apps/stream/views/terminal_view.h"
@@ -35,6 +36,8 @@ struct StreamSettings {
   std::optional<WebAddress> web = {};   ///< serve the live page
   std::string badge = {}, source = {};  ///< for the page: what is streamed
   std::vector<std::string> found = {};  ///< for the page: what a probe of the source found, a line each
+  std::optional<Sensor> draft = {};     ///< of that probe
+  std::string draft_file = {};          ///< that holds it; empty: none
   std::map<std::string, std::string> metadata = {};  ///< of files with pictures
 };
 
@@ -94,6 +97,7 @@ class Stream {
   std::unique_ptr<TerminalView> view_;
   std::unique_ptr<PipeOutput> pipe_;
   std::unique_ptr<Recorder> recorder_;  // at the page's wish
+  std::unique_ptr<PressedOrder> order_;
   std::unique_ptr<WebView> web_;
   struct Place {
     double time_s;

@@ -9,21 +9,26 @@ namespace supertac {
 
 constexpr double kSurfaceEveryS = 1;
 
-WebView::WebView(const WebAddress& address, const WebSource& source, Recorder& recorder)
-    : source_(source), recorder_(recorder), server_(address, site()) {}
+WebView::WebView(const WebAddress& address, const WebSource& source, Recorder& recorder, PressedOrder* order)
+    : source_(source), recorder_(recorder), order_(order), server_(address, site()) {}
 
 WebSite WebView::site() {
-  return {.page = live_page(),
-          .hello = [this] { return hello(); },
-          .news = [this] { return news(); },
-          .actions = {{"rezero",
-                       [this] {
-                         rezero_ = true;
-                         return std::string("what the array feels now counts as nothing");
-                       }},
-                      {"record", [this] { return recorder_.start(); }},
-                      {"stop", [this] { return recorder_.stop(); }}},
-          .file = [this](const std::string& name) { return recorder_.file(name); }};
+  WebSite site{.page = live_page(),
+               .hello = [this] { return hello(); },
+               .news = [this] { return news(); },
+               .actions = {{"rezero",
+                            [this] {
+                              rezero_ = true;
+                              return std::string("what the array feels now counts as nothing");
+                            }},
+                           {"record", [this] { return recorder_.start(); }},
+                           {"stop", [this] { return recorder_.stop(); }}},
+               .file = [this](const std::string& name) { return recorder_.file(name); }};
+  if (order_ == nullptr) return site;
+  site.actions["order"] = [this] { return order_->start(); };
+  site.actions["skip"] = [this] { return order_->skip(); };
+  site.actions["leave"] = [this] { return order_->leave(); };
+  return site;
 }
 
 bool WebView::update(const LiveState& state, const SurfaceMap* map, const MapRegion& changed) {
@@ -89,6 +94,8 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
   if (const auto& most = state.most_changed)
     event["most"] = {
         {"taxel", most->taxel}, {"channel", most->channel}, {"rest", most->rest}, {"now", most->now}};
+  if (state.order.asked) event["asked"] = *state.order.asked;
+  if (!state.order.says.empty()) event["order"] = state.order.says;
   if (!state.picture.empty()) event["picture"] = levels_base64(state.picture);
   if (!state.half_widths.empty()) event["wide"] = levels_base64(state.half_widths);
   if (state.distance) event["distance"] = *state.distance, event["unlike"] = state.unlike_training;

@@ -31,8 +31,8 @@ struct WebSource {
 /// Serves live_page() with the newest state, 30 times a second at most, from a thread of its own.
 class WebView {
  public:
-  /// `recorder` must outlive this. Throws as WebServer.
-  WebView(const WebAddress& address, const WebSource& source, Recorder& recorder);
+  /// `recorder` and `order`, of a page of a probe, must outlive this. Throws as WebServer.
+  WebView(const WebAddress& address, const WebSource& source, Recorder& recorder, PressedOrder* order);
 
   /// Never waits: a state that comes while the server takes the one before is left out, and false returned.
   /// `changed`: region of the map (null: there is none) since the last that was taken. A page that comes
@@ -51,6 +51,7 @@ class WebView {
 
   WebSource source_;
   Recorder& recorder_;
+  PressedOrder* order_;
   std::atomic<bool> rezero_{false};
   std::mutex mutex_;
   std::optional<LiveState> newest_;

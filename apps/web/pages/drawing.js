@@ -93,6 +93,16 @@ function cross(g, box, silent, rows, columns) {
   g.stroke();
 }
 
+// Round the place that is asked for; seen on every colour.
+function ring(g, box, k, rows, columns) {
+  const dx = box.w / columns, dy = box.h / rows, x = box.x + (k % columns) * dx, y = box.y + (rows - 1 - Math.floor(k / columns)) * dy;
+  for (const [color, width] of [["#000", 6], ["#fff", 3]]) {
+    g.strokeStyle = color;
+    g.lineWidth = width;
+    g.strokeRect(x + 3, y + 3, dx - 6, dy - 6);
+  }
+}
+
 // The colours from 0 to 1 and what the ends mean.
 function drawBar(g, w, [low, high], left = 30) {
   const map = supertac.hello.map, width = w - left - 6;

@@ -116,6 +116,7 @@ function drawPictures(event) {
   const felt = prepared(element("felt"));
   const box = drawPicture(felt.g, felt.w, felt.h, event && event.felt, h.rows, h.columns, h.pitch_mm, null);
   cross(felt.g, box, h.silent, h.rows, h.columns);
+  if (event && event.asked !== undefined) ring(felt.g, box, event.asked, h.rows, h.columns);
   const feltBar = prepared(element("felt-bar"));
   drawBar(feltBar.g, feltBar.w, feltEnds(event, feltBar.w));
   drawStrip(element("taxels"), strips.felt, event && event.felt ? event.top : 1, h.rows * h.columns,
@@ -138,6 +139,14 @@ function mostText({taxel, channel, rest, now}) {
          (channels > 1 ? `, channel ${channel}` : "") + `: ${rest.toFixed(digits)} at rest, ${now.toFixed(digits)} now`;
 }
 
+function askText({asked, order = ""}) {
+  const {rows, columns, silent} = supertac.hello;
+  if (asked === undefined) return order || "Press the places one after the other, and the file gets the order in which frames send them.";
+  return (order ? `${order}. ` : "") + `Place ${asked + 1} of ${rows * columns}: press row ${Math.floor(asked / columns)}, ` +
+         `column ${asked % columns}, which is framed, and let go; row 0 is at the bottom. ` +
+         (silent.includes(asked) ? "The file says that nothing answers there. " : "") + "Escape: the file stays as it is.";
+}
+
 function showFigures(event) {
   const set = (id, text) => { if (element(id).textContent !== text) element(id).textContent = text; };
   set("rate", event.rate.toFixed(0) + " /s");
@@ -146,6 +155,9 @@ function showFigures(event) {
   set("lost", String(event.lost));
   set("dropped", String(event.dropped));
   set("most", event.most ? mostText(event.most) : "press a taxel: its number is shown here");
+  set("ask", askText(event));
+  element("order").setAttribute("aria-pressed", event.asked !== undefined);
+  element("skip").disabled = event.asked === undefined;
   set("time", event.t.toFixed(1) + " s");
   set("place", event.x === undefined ? "unknown" : `x ${event.x.toFixed(1)}, y ${event.y.toFixed(1)} mm`);
   if (!supertac.hello.draws) setLamp("lamp", "", "no model: the array itself");
@@ -229,7 +241,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { re
 
 // --- What can be done ----------------------------------------------------------------------------------------
 
-async function ask(action) { element("said").textContent = await link.act(action); }
+async function ask(action, id = "said") { element(id).textContent = await link.act(action); }
 
 function pause() {
   supertac.paused = !supertac.paused;
@@ -288,15 +300,19 @@ const actions = {
   pause, snapshot,
   record: () => ask(element("record").getAttribute("aria-pressed") === "true" ? "stop" : "record"),
   rezero: () => ask("rezero"),
+  order: () => ask(supertac.newest && supertac.newest.asked !== undefined ? "leave" : "order", "ask"),
+  skip: () => ask("skip", "ask"),
 };
 for (const id of Object.keys(actions)) element(id).addEventListener("click", actions[id]);
 element("guess").addEventListener("change", () => { resized = true; });
-const keys = {" ": "pause", r: "record", z: "rezero", s: "snapshot"};
+const keys = {" ": "pause", r: "record", z: "rezero", s: "snapshot", o: "order", n: "skip"};
 addEventListener("keydown", (e) => {
   if (e.ctrlKey || e.metaKey || e.altKey || e.repeat) return;
   const key = e.key.toLowerCase();
   if (key === "g") element("guess").click();
-  if (!keys[key] || (key === " " && e.target !== document.body)) return;
+  const button = element(keys[key]);
+  if (key === "escape" && !element("skip").disabled) ask("leave", "ask");
+  if (!button || button.disabled || button.closest("[hidden]") || (key === " " && e.target !== document.body)) return;
   e.preventDefault();
   actions[keys[key]]();
 });

@@ -11,6 +11,7 @@ import json
 import os
 import pathlib
 import pty
+import random
 import re
 import shutil
 import struct
@@ -242,8 +243,8 @@ def check_snapshot(browser, folder):
 class Mat:
     """A device on a pseudo-terminal that sends lines of 4x6 counts, 50 a second, one taxel pressed; the last never changes."""
 
-    def __init__(self):
-        self.pressed, self.sending = 0, True
+    def __init__(self, wiring=range(24)):
+        self.pressed, self.sending, self.wiring = 0, True, list(wiring)  # pressed: a place, or a set of them
         self.end, terminal = pty.openpty()
         tty.setraw(terminal)
         os.set_blocking(self.end, False)
@@ -257,7 +258,8 @@ class Mat:
             if not self.sending:
                 return
             time.sleep(max(0, begin + n / 50 - time.monotonic()))
-            values = [100 + 2 * k + (n + k) % 3 + 400 * (k == self.pressed) for k in range(23)] + [7]
+            pressed = {self.wiring[p] for p in (self.pressed if isinstance(self.pressed, set) else {self.pressed})}
+            values = [100 + 2 * k + (n + k) % 3 + 400 * (k in pressed) for k in range(23)] + [7]
             with contextlib.suppress(BlockingIOError):  # nobody listens
                 os.write(self.end, (",".join(map(str, [20 * n, *values])) + "\n").encode())
 
@@ -291,6 +293,68 @@ def check_probe(binaries, folder, browser, screenshots):
             assert browser.js("return supertac.newest.felt.indexOf(Math.max(...supertac.newest.felt))") == taxel
         if screenshots:
             keep_screenshots(browser, screenshots, "probe")
+        process.terminate()
+        assert process.wait(60) == 143
+
+
+def check_order(binaries, folder, browser, screenshots):
+    """Each place of the array is pressed in turn: the file gets the order, and rest and dead follow their taxels."""
+    wiring = random.Random(57).sample(range(24), 24)
+    mat = Mat(wiring)
+    with contextlib.ExitStack() as stack:
+        stack.callback(mat.stop)
+        command = [binaries / "supertac-stream", "--sensor", mat.port, "--probe", "--seconds", "3", "--web", "0", "--out", "turns.json"]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=folder)
+        stack.callback(process.kill)
+        time.sleep(1)
+        mat.pressed = set()
+        url = next(m[1] for line in process.stderr if (m := re.search(r"live page: (\S+)", line)))
+        before = (folder / "turns.json").read_bytes()
+        draft = json.loads(before)
+        assert "order" not in draft and len(draft["rest"]) == 24, draft
+        browser.look(1280, 860)
+        browser.open(url)
+        wait_until("the page", lambda: "Press the places" in text(browser, "ask"))
+
+        def asked():
+            return browser.js("return supertac.newest.asked ?? -1")
+
+        def press(*places):
+            mat.pressed = set(places)
+            top = max(range(24), key=lambda p: (p in places, -p))
+            wait_until("felt", lambda: browser.js(f"return supertac.newest.felt[{wiring[top]}]") > 100)
+            time.sleep(0.5)
+            mat.pressed = set()
+            time.sleep(0.5)
+
+        browser.press("o")
+        wait_until("the first place is asked for", lambda: asked() == 0)
+        press(0)
+        wait_until("the second", lambda: asked() == 1)
+        browser.press("\ue00c")  # Escape
+        wait_until("it is left", lambda: "turns.json is as it was" in text(browser, "ask"))
+        assert (folder / "turns.json").read_bytes() == before
+        browser.press("o")
+        for place in range(24):
+            wait_until(f"place {place} is asked for", lambda: asked() == place)  # noqa: B023
+            if place == 3:
+                press(3, 9)
+                wait_until("two at once are not taken", lambda: "answered alike: press one place alone" in text(browser, "ask"))
+                assert asked() == 3
+            if place == 5:
+                press(2)
+                wait_until("nor is one twice", lambda: "answered again, as at row 0, column 2" in text(browser, "ask"))
+                assert asked() == 5
+                if screenshots:
+                    keep_screenshots(browser, screenshots, "order")
+            if wiring[place] == 23:
+                browser.press("n")
+            else:
+                press(place)
+        wait_until("the file has it", lambda: "turns.json has the order" in text(browser, "ask"))
+        found = json.loads((folder / "turns.json").read_text())
+        assert found["order"] == wiring and found["dead"] == [wiring.index(23)], found
+        assert found["rest"] == [draft["rest"][at] for at in wiring], found
         process.terminate()
         assert process.wait(60) == 143
 
@@ -357,6 +421,7 @@ def main():
             check_page(binaries, folder, browser, screenshots)
             check_elements(binaries, folder, browser, screenshots)
             check_probe(binaries, folder, browser, screenshots)
+            check_order(binaries, folder, browser, screenshots)
     print("the page does what it says")
     return 0
 
