@@ -108,23 +108,16 @@ void declare(Arguments& a) {
 }
 
 /// Whether it names a sensor's file, whatever its ending, and no address: a file is one as well where a
-/// sensor's bytes were kept, of which every line may be an object.
+/// sensor's bytes were kept, which are not one object.
 bool describes_sensor(const std::string& named) {
-  constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 20;
   if (named == "rig" || named.ends_with(".json")) return true;
   std::error_code error;
-  if (!std::filesystem::is_regular_file(named, error) ||
-      std::filesystem::file_size(named, error) > kMostBytes)
+  if (!std::filesystem::is_regular_file(named, error) || std::filesystem::file_size(named, error) > 1U << 20)
     return false;
-  const std::string text = read_text_file(named, kMostBytes);
-  const std::size_t begin = text.find_first_not_of(" \t\r\n"), end = text.find('\n', begin);
-  if (begin == std::string::npos || text[begin] != '{') return false;
-  if (text.find_first_not_of(" \t\r\n", end) == std::string::npos) return true;
   try {
-    (void)parse_json_limited(std::string_view(text).substr(begin, end - begin));
+    return parse_json_limited(read_text_file(named, 1U << 20)).is_object();
+  } catch (const JsonError&) {
     return false;
-  } catch (const JsonError&) {  // goes on in the next line
-    return true;
   }
 }
 

@@ -22,7 +22,6 @@ double bits_of_share(double a, double b) {
 
 namespace {
 
-constexpr std::size_t kClasses = BinaryColumns::kClasses;
 constexpr double kMostExceptions = 0.2;  // of a constant, a counter or a clock: bytes may have been lost
 
 // What is odd in a column comes in runs, as damage and restarts do: bits of where they begin and end, and of
@@ -322,7 +321,7 @@ void BinaryColumns::find_fields(double seconds) {
         for (std::size_t k = before; k < fields_[c].size(); ++k) fields_[c][k].big_endian = big;
       }
     double same = 0;
-    for (std::size_t width = 1; width <= kMostSkipped && width < period; ++width) {
+    for (std::size_t width = 1; width <= 4 && width < period; ++width) {
       same += 9 + constant(c + width - 1);
       if (same < kNever) fields_[c].push_back({{FrameField::Is::skip, width, ""}, {}, width, 20 + same});
       fields_[c].push_back({{FrameField::Is::skip, width, ""},

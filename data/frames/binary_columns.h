@@ -13,7 +13,11 @@
 
 namespace supertac {
 
+struct Heard;
+
 using Bytes = std::span<const unsigned char>;
+inline constexpr double kNever = std::numeric_limits<double>::infinity();  ///< bits of what is not so
+inline constexpr std::size_t kClasses = 34;                                ///< of powers of two
 
 /// Bits of which of `a + b` events were of one kind and which of the other, each as likely as those before
 /// say (Krichevsky and Trofimov): of sequences of two kinds, whatever share they have.
@@ -23,12 +27,21 @@ double bits_of_share(double a, double b);
 /// likeliest first, none of them only a multiple of another.
 std::vector<std::size_t> periods_of(Bytes bytes);
 
+/// "SLIP", "HDLC" or "COBS", which replace bytes within frames, where what stands between their marks has one
+/// size only when that is undone; empty else.
+std::string framing_of(Bytes bytes);
+
 /// Periods in a row in which nothing was lost.
 struct Stretch {
   std::size_t period = 0, begin = 0, rows = 0;
 };
 /// The longest one: the bytes that return a period later outweigh what returns by chance.
 Stretch stretch_of(Bytes bytes, std::size_t period);
+
+/// What came after a pause begins a frame: cost of where the pauses ended, for each byte of the period. The
+/// first of `bytes` bytes that are looked at is `first_byte` of those heard.
+std::vector<double> bits_of_starts(std::span<const Heard> heard, std::size_t first_byte,
+                                   const Stretch& stretch, double seconds, std::size_t bytes);
 
 /// A field that is no value, as it may stand in a period from some byte on.
 struct FieldFound {
@@ -48,9 +61,6 @@ class BinaryColumns {
  public:
   /// `seconds`: what the stretch took, 0 where it came at once.
   BinaryColumns(Bytes bytes, const Stretch& stretch, double seconds);
-
-  static constexpr double kNever = std::numeric_limits<double>::infinity();
-  static constexpr std::size_t kMostSkipped = 4, kClasses = 34;  // of powers of two
 
   /// As values of one type, from every byte of the period on.
   struct Values {

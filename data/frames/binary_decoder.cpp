@@ -16,40 +16,42 @@ std::uint64_t bits_at(const std::byte* bytes, std::size_t count, bool big_endian
 
 constexpr std::size_t kMostReturns = 8;
 
+/// A remainder of division by a polynomial.
 struct Crc {
+  std::string_view kind;
   unsigned bits;
   std::uint32_t polynomial, begin;
   bool reflected;  // polynomial too: lowest bit first
   std::uint32_t end;
+  std::array<std::uint32_t, 256> table = {};
+
+  constexpr Crc(std::string_view of, unsigned width, std::uint32_t by, std::uint32_t from, bool lowest,
+                std::uint32_t crossed)
+      : kind(of), bits(width), polynomial(by), begin(from), reflected(lowest), end(crossed) {
+    const std::uint32_t top = std::uint32_t{1} << (bits - 1);
+    for (std::uint32_t byte = 0; byte < 256; ++byte) {
+      std::uint32_t sum = reflected ? byte : byte << (bits - 8);
+      for (int bit = 0; bit < 8; ++bit)
+        sum = reflected ? sum >> 1 ^ ((sum & 1) != 0 ? polynomial : 0)
+                        : sum << 1 ^ ((sum & top) != 0 ? polynomial : 0);
+      table[byte] = sum & (top | (top - 1));
+    }
+  }
+  std::uint32_t of(std::span<const std::byte> bytes) const {
+    std::uint32_t sum = begin;
+    for (const std::byte byte : bytes) {
+      const std::uint32_t at = (reflected ? sum : sum >> (bits - 8)) ^ std::to_integer<std::uint32_t>(byte);
+      sum = table[at & 0xFF] ^ (bits == 8 ? 0 : reflected ? sum >> 8 : sum << 8);
+      if (bits < 32) sum &= (1U << bits) - 1;
+    }
+    return sum ^ end;
+  }
 };
-constexpr Crc kCrc8{8, 0x07, 0, false, 0}, kModbus{16, 0xA001, 0xFFFF, true, 0},
-    kCcitt{16, 0x1021, 0xFFFF, false, 0}, kCrc32{32, 0xEDB88320, 0xFFFFFFFF, true, 0xFFFFFFFF};
-
-constexpr std::array<std::uint32_t, 256> table_of(const Crc& crc) {
-  std::array<std::uint32_t, 256> table{};
-  const std::uint32_t top = std::uint32_t{1} << (crc.bits - 1);
-  for (std::uint32_t byte = 0; byte < 256; ++byte) {
-    std::uint32_t sum = crc.reflected ? byte : byte << (crc.bits - 8);
-    for (int bit = 0; bit < 8; ++bit)
-      sum = crc.reflected ? sum >> 1 ^ ((sum & 1) != 0 ? crc.polynomial : 0)
-                          : sum << 1 ^ ((sum & top) != 0 ? crc.polynomial : 0);
-    table[byte] = sum & (top | (top - 1));
-  }
-  return table;
-}
-
-template <const Crc& crc>
-std::uint32_t crc_of(std::span<const std::byte> bytes) {
-  static constexpr std::array<std::uint32_t, 256> kTable = table_of(crc);
-  std::uint32_t sum = crc.begin;
-  for (const std::byte byte : bytes) {
-    const std::uint32_t at =
-        (crc.reflected ? sum : sum >> (crc.bits - 8)) ^ std::to_integer<std::uint32_t>(byte);
-    sum = kTable[at & 0xFF] ^ (crc.bits == 8 ? 0 : crc.reflected ? sum >> 8 : sum << 8);
-    if constexpr (crc.bits < 32) sum &= (1U << crc.bits) - 1;
-  }
-  return sum ^ crc.end;
-}
+constexpr Crc kCrcs[] = {{"crc8", 8, 0x07, 0, false, 0},
+                         {"crc16-modbus", 16, 0xA001, 0xFFFF, true, 0},
+                         {"crc16-ccitt", 16, 0x1021, 0xFFFF, false, 0},
+                         {"crc16-xmodem", 16, 0x1021, 0, false, 0},
+                         {"crc32", 32, 0xEDB88320, 0xFFFFFFFF, true, 0xFFFFFFFF}};
 
 std::span<const std::byte> bytes_in(const std::string& text) { return std::as_bytes(std::span(text)); }
 
@@ -70,15 +72,12 @@ double number_at(const std::byte* bytes, const std::string& type, bool big_endia
 }
 
 std::size_t checksum_bytes(const std::string& kind) {
-  if (kind == "none") return 0;
-  return kind == "crc32" ? 4 : kind.starts_with("crc16") || kind == "sum16" ? 2 : 1;
+  return kind == "none" ? 0 : kind == "crc32" ? 4 : kind.find("16") != std::string::npos ? 2 : 1;
 }
 
 std::uint32_t checksum_of(const std::string& kind, std::span<const std::byte> bytes) {
-  if (kind == "crc8") return crc_of<kCrc8>(bytes);
-  if (kind == "crc16-modbus") return crc_of<kModbus>(bytes);
-  if (kind == "crc16-ccitt") return crc_of<kCcitt>(bytes);
-  if (kind == "crc32") return crc_of<kCrc32>(bytes);
+  for (const Crc& crc : kCrcs)
+    if (crc.kind == kind) return crc.of(bytes);
   std::uint32_t sum = 0;
   for (const std::byte b : bytes) {
     const auto byte = std::to_integer<std::uint32_t>(b);

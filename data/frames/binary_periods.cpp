@@ -1,16 +1,16 @@
 // After how many bytes the bytes of a stream return.
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "data/frames/binary_columns.h"
+#include "data/frames/probe.h"
 #include "io/numbers/median.h"
 
 namespace supertac {
 namespace {
 
-constexpr std::size_t kShortest = 4, kLongest = 20'000, kRows = 6, kMostPeriods = 4, kShortlist = 300;
 constexpr std::size_t kBlock = 4096, kBlocks = 12;  // of the bytes that all periods are tried on
-constexpr double kNotable = 0.5, kSigmas = 4;
 
 // A shape that compilers make vectors of.
 std::size_t equal_bytes(const unsigned char* a, const unsigned char* b, std::size_t count) {
@@ -37,14 +37,15 @@ Lag lag_of(std::size_t period, std::size_t equal, std::size_t count) {
   return {period, share, std::sqrt(std::max(share * (1 - share), 1e-6) / n)};
 }
 
-// Of lags in ascending order those after which notably more returns than usual. A multiple stays only if more
-// returns after it than after what it is a multiple of.
+// Of lags in ascending order those after which at least half as much more returns than usual as after the
+// best. A multiple stays only if more returns after it, by four standard errors, than after what it is a
+// multiple of.
 std::vector<Lag> notable(const std::vector<Lag>& lags, double usual) {
   const double most = std::ranges::max_element(lags, {}, &Lag::share)->share;
   std::vector<Lag> kept;
   for (const Lag& lag : lags)
-    if (lag.share - usual >= kNotable * (most - usual) && std::ranges::none_of(kept, [&](const Lag& k) {
-          return lag.period % k.period == 0 && lag.share < k.share + kSigmas * lag.sigma;
+    if (lag.share - usual >= 0.5 * (most - usual) && std::ranges::none_of(kept, [&](const Lag& k) {
+          return lag.period % k.period == 0 && lag.share < k.share + 4 * lag.sigma;
         }))
       kept.push_back(lag);
   return kept;
@@ -53,11 +54,11 @@ std::vector<Lag> notable(const std::vector<Lag>& lags, double usual) {
 }  // namespace
 
 std::vector<std::size_t> periods_of(Bytes bytes) {
-  const std::size_t longest = std::min(kLongest, bytes.size() / kRows);
-  if (longest < kShortest) return {};
+  const std::size_t longest = std::min<std::size_t>(20'000, bytes.size() / 6);  // it returns five times
+  if (longest < 4) return {};
   std::vector<Lag> lags;
   const std::size_t room = bytes.size() - longest;
-  for (std::size_t p = kShortest; p <= longest; ++p) {
+  for (std::size_t p = 4; p <= longest; ++p) {
     if (room <= kBlock * kBlocks) {
       lags.push_back(lag_of(p, equal_bytes(&bytes[0], &bytes[p], room), room));
       continue;
@@ -74,7 +75,7 @@ std::vector<std::size_t> periods_of(Bytes bytes) {
   const double usual = median(shares);
   lags = notable(lags, usual);
   std::ranges::sort(lags, std::greater(), &Lag::share);
-  if (lags.size() > kShortlist) lags.resize(kShortlist);
+  if (lags.size() > 300) lags.resize(300);
   std::ranges::sort(lags, {}, &Lag::period);
   for (Lag& lag : lags) {
     const std::size_t count = bytes.size() - lag.period;
@@ -84,7 +85,7 @@ std::vector<std::size_t> periods_of(Bytes bytes) {
   std::ranges::sort(lags, std::greater(), &Lag::share);
   std::vector<std::size_t> periods;
   for (const Lag& lag : lags)
-    if (periods.size() < kMostPeriods) periods.push_back(lag.period);
+    if (periods.size() < 4) periods.push_back(lag.period);
   return periods;
 }
 
@@ -105,6 +106,72 @@ Stretch stretch_of(Bytes bytes, std::size_t period) {
     if (sum > most) most = sum, best = {period, begin * period, k - begin + 2};
   }
   return best;
+}
+
+std::vector<double> bits_of_starts(std::span<const Heard> heard, std::size_t first_byte,
+                                   const Stretch& stretch, double seconds, std::size_t bytes) {
+  const std::size_t period = stretch.period;
+  std::vector<std::size_t> counts(period);
+  std::size_t all = 0, at = 0;
+  double before = -1e9;
+  const double pause = 0.3 * seconds * static_cast<double>(period) / static_cast<double>(bytes);
+  for (const Heard& chunk : heard) {
+    const bool within =
+        at >= first_byte + stretch.begin && at < first_byte + stretch.begin + stretch.rows * period && at > 0;
+    if (within && chunk.time_s - before > pause) ++counts[(at - first_byte - stretch.begin) % period], ++all;
+    at += chunk.bytes.size(), before = chunk.time_s;
+  }
+  std::vector<double> bits(period);
+  for (std::size_t c = 0; c < period; ++c) {
+    const auto in = static_cast<double>(counts[c]), out = static_cast<double>(all - counts[c]);
+    bits[c] = bits_of_share(in, out) + out * std::log2(static_cast<double>(period));
+  }
+  const double least = std::ranges::min(bits);
+  for (double& b : bits) b = std::min(b - least, 30.0);
+  // Every second time the bytes begin with a frame, and end with one.
+  const double by_chance = std::log2(static_cast<double>(period) + 1);
+  const std::size_t end = bytes - first_byte - stretch.begin;
+  for (std::size_t c = 0; c < period; ++c) {
+    if (first_byte + stretch.begin == 0 && c > 0) bits[c] += by_chance;
+    if (end < (stretch.rows + 1) * period && (end - c) % period != 0) bits[c] += by_chance;
+  }
+  return bits;
+}
+
+std::string framing_of(Bytes bytes) {
+  struct Framing {
+    const char* name;
+    unsigned char mark, escape, first, second;  // escape: what begins a pair for one byte; what ends it
+  };
+  for (const auto& [name, mark, escape, first, second] :
+       {Framing{"SLIP", 0xC0, 0xDB, 0xDC, 0xDD}, {"HDLC", 0x7E, 0x7D, 0x5D, 0x5E}, {"COBS", 0, 0, 0, 0}}) {
+    std::map<std::size_t, std::size_t> sizes, replaced;  // of all frames, and of those with replaced bytes
+    std::size_t frames = 0;
+    auto at = std::ranges::find(bytes, mark);
+    for (auto end = at; at != bytes.end(); at = end) {
+      end = std::find(at + 1, bytes.end(), mark);
+      if (end == bytes.end() || end == at + 1) continue;
+      std::size_t size = 0, pairs = 0;
+      bool whole = true;
+      for (auto byte = at + 1; byte < end && whole; ++size) {
+        const auto left = end - byte;
+        const std::size_t block = *byte++;
+        if (mark == 0) {  // says where the next zero stood
+          whole = static_cast<std::ptrdiff_t>(block) <= left;
+          if (whole)
+            byte += static_cast<std::ptrdiff_t>(block) - 1, size += block - (block == 255 ? 2 : 1),
+                pairs += byte < end ? 1 : 0;
+        } else if (block == escape) {
+          whole = byte < end && (*byte == first || *byte == second), ++pairs, ++byte;
+        }
+      }
+      ++frames;
+      if (whole && size >= 4) ++sizes[size], replaced[size] += pairs > 0 ? 1 : 0;
+    }
+    for (const auto& [size, count] : sizes)
+      if (10 * count > 9 * frames && replaced[size] >= 2) return name;
+  }
+  return "";
 }
 
 }  // namespace supertac

@@ -9,10 +9,10 @@
 namespace supertac {
 
 std::array<float, rig::kTaxels> taxel_volts(const BoardFrame& frame) {
-  constexpr auto kVoltsPerCode = static_cast<float>(rig::kAdcVolts / rig::kAdcCodes);
   std::array<float, rig::kTaxels> volts{};
   for (int k = 0; k < rig::kTaxels; ++k)
-    volts[static_cast<std::size_t>(k)] = static_cast<float>(frame.taxel(k)) * kVoltsPerCode;
+    volts[static_cast<std::size_t>(k)] =
+        static_cast<float>(frame.taxel(k)) * static_cast<float>(rig::kAdcVolts / rig::kAdcCodes);
   return volts;
 }
 
@@ -20,14 +20,13 @@ bool is_frame(const std::byte* bytes) {
   static_assert(std::endian::native == std::endian::little, "the mask below is for little-endian words");
   if (bytes[0] != kFrameHeader || bytes[rig::kFrameBytes - 1] != kFrameTrailer) return false;
   // The high bytes are at 1, 3, ..., 161: every even byte of the 162 that follow the header.
-  constexpr std::uint64_t kHighNibbles = 0x00F000F000F000F0ULL;
   std::uint64_t seen = 0;
   for (std::size_t at = 1; at + 8 <= 161; at += 8) {
     std::uint64_t word = 0;
     std::memcpy(&word, bytes + at, sizeof word);
     seen |= word;
   }
-  return (seen & kHighNibbles) == 0 && (bytes[161] & std::byte{0xF0}) == std::byte{0};
+  return (seen & 0x00F000F000F000F0ULL) == 0 && (bytes[161] & std::byte{0xF0}) == std::byte{0};
 }
 
 BoardFrame parse_frame(const std::byte* bytes) {
@@ -43,9 +42,9 @@ BoardFrame parse_frame(const std::byte* bytes) {
 
 void write_frame(const BoardFrame& frame, std::span<std::byte, rig::kFrameBytes> out) {
   const auto put = [&out](std::size_t at, std::uint16_t value) {
-    if (value > kAdcMax) {
+    if (value >= rig::kAdcCodes) {
       throw std::invalid_argument("write_frame: sample " + std::to_string(value) + ", expected at most " +
-                                  std::to_string(kAdcMax));
+                                  std::to_string(rig::kAdcCodes - 1));
     }
     out[at] = static_cast<std::byte>(value >> 8);
     out[at + 1] = static_cast<std::byte>(value & 0xFF);
@@ -63,7 +62,7 @@ std::uint32_t damaged_frames(std::uint64_t discarded) {
 bool JumpDetector::jump(const BoardFrame& frame) {
   bool far = false;
   for (int k = 0; k < rig::kTaxels && !first_; ++k) {
-    far = far || std::abs(frame.taxel(k) - last_[static_cast<std::size_t>(k)]) > kLimit;
+    far = far || std::abs(frame.taxel(k) - last_[static_cast<std::size_t>(k)]) > 124;
   }
   first_ = false;
   // Three in a row are a change of the world, not of a byte.

@@ -16,7 +16,6 @@ namespace supertac {
 
 constexpr std::byte kFrameHeader{0x24};
 constexpr std::byte kFrameTrailer{0x21};
-constexpr std::uint16_t kAdcMax = rig::kAdcCodes - 1;
 
 struct BoardFrame {
   std::array<std::uint16_t, rig::kFrameSamples> samples{};
@@ -45,14 +44,14 @@ void write_frame(const BoardFrame& frame, std::span<std::byte, rig::kFrameBytes>
 /// a cable's errors.
 std::uint32_t damaged_frames(std::uint64_t discarded);
 
-/// Flags physically implausible jumps: a taxel that moves more than 124 ADC steps between two frames. A
-/// flipped bit in a sample passes every check of the format; only this can show it.
+/// Flags physically implausible jumps: a taxel that moves more than 124 ADC steps, 0.1 V, between two frames,
+/// in which the finger moves 0.01 mm at 10 mm/s. A flipped bit in a sample passes every check of the format;
+/// only this can show it.
 class JumpDetector {
  public:
   bool jump(const BoardFrame& frame);
 
  private:
-  static constexpr int kLimit = 124;  // 0.1 V in a period: at 10 mm/s the finger has moved 0.01 mm
   std::array<int, rig::kTaxels> last_{};
   int flagged_ = 0;
   bool first_ = true;

@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "data/frames/binary_decoder.h"
 #include "data/frames/text_grammar.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
@@ -11,10 +12,6 @@
 namespace supertac {
 namespace {
 
-constexpr double kUsual = 0.5;     // of the lines at least are read alike
-constexpr double kPeriodic = 0.7;  // of the gaps between lines of a kind are alike
-constexpr std::size_t kMostLines = 300, kFewFrames = 3;
-constexpr double kRowsAlike = 0.9;  // of the variance stay within rows that are frames
 constexpr double kRowsDiffer =
     0.7;  // of the variance of all: what stays within the rows, where rows are taxels
 
@@ -43,57 +40,6 @@ Reading read_as(const std::vector<std::string>& lines, char separator, char deci
   return reading;
 }
 
-enum class Commas { lists, points, doubt };
-
-/// Whether commas glued between digits, "1,5", are points. They are not where "," also parts such numbers.
-/// What stands behind a point is digits: of fixed width they begin with 0 as often as not (a number does
-/// not), and one digit takes all ten values; of varying width they do not end in 0. What fits neither is a
-/// doubt.
-Commas commas_of(const std::vector<std::string>& lines) {
-  std::size_t all = 0, parted = 0, fractions = 0, with = 0, padded = 0, leading = 0, trailing = 0;
-  std::map<std::size_t, std::size_t> widths;
-  std::map<char, std::size_t> firsts;
-  for (const std::string& line : lines) {
-    const auto slots = slots_of(behind_stamp(line), 0, ',');
-    with += !slots.empty();
-    for (std::size_t i = 0; i < slots.size(); ++i) {
-      if (slots[i].wall) continue;
-      ++all;
-      std::string before(slots[i].before);
-      std::erase(before, '"');
-      parted += i > 0 && before == ",";
-      const std::size_t comma = slots[i].text.find(',');
-      if (comma == std::string::npos) continue;
-      const std::string_view whole = slots[i].text.substr(0, comma), part = slots[i].text.substr(comma + 1);
-      ++fractions, ++widths[part.size()], ++firsts[part[0]];
-      padded += whole.size() > 1 && whole[0] == '0';
-      leading += part.size() > 1 && part[0] == '0';
-      trailing += part.back() == '0';
-    }
-  }
-  constexpr std::size_t kTellsZeros = 40;  // of so many numbers one ends in 0 (and one digit in ten is each)
-  if (fractions == 0 || 20 * parted >= all) return Commas::lists;
-  // Damaged lines are few.
-  const auto few = [&](std::size_t count) { return 25 * count < fractions; };
-  std::erase_if(widths, [&](const auto& w) { return few(w.second); });
-  std::erase_if(firsts, [&](const auto& f) { return 100 * f.second < fractions; });
-  const bool many = fractions >= kTellsZeros;
-  Commas commas = Commas::doubt;
-  if (!few(padded) || !many)
-    commas = widths.size() > 1 && trailing > 0 && leading == 0 ? Commas::lists : Commas::doubt;
-  else if (!few(leading))
-    commas = Commas::points;
-  else if (widths.size() > 1)
-    commas = few(trailing) ? Commas::points : Commas::lists;
-  else if (widths.begin()->first > 1)
-    commas = Commas::lists;
-  else if (firsts.size() == 10)
-    commas = Commas::points;
-  // A line that is nothing else is rather two columns than one.
-  if (all == fractions && all <= with) return commas == Commas::points ? Commas::doubt : Commas::lists;
-  return commas;
-}
-
 struct Kind {
   std::string begins;     // the template before the first number
   std::size_t count = 0;  // of numbers
@@ -102,12 +48,11 @@ struct Kind {
 
 /// The distance from each line of a kind to the next, where most have the same.
 std::optional<std::size_t> usual_gap(const std::vector<std::size_t>& places) {
-  if (places.size() < kFewFrames) return std::nullopt;
+  if (places.size() < 3) return std::nullopt;
   std::map<std::size_t, std::size_t> gaps;
   for (std::size_t i = 1; i < places.size(); ++i) ++gaps[places[i] - places[i - 1]];
   const auto usual = std::ranges::max_element(gaps, {}, [](const auto& g) { return g.second; });
-  if (static_cast<double>(usual->second) < kPeriodic * static_cast<double>(places.size() - 1))
-    return std::nullopt;
+  if (static_cast<double>(usual->second) < 0.7 * static_cast<double>(places.size() - 1)) return std::nullopt;
   return usual->first;
 }
 
@@ -186,7 +131,7 @@ bool find_turns(const Survey& survey, TextGrammar& grammar) {
   std::size_t period = 1;
   for (const auto& [kind, of] : places)
     if (const auto gap = usual_gap(of);
-        gap && *gap > period && *gap <= kMostLines &&
+        gap && *gap > period && *gap <= 300 &&
         static_cast<double>(of.size() * *gap) > 0.6 * static_cast<double>(kinds.size()))
       period = *gap;
   std::vector<Kind> anchors;
@@ -218,7 +163,7 @@ bool find_turns(const Survey& survey, TextGrammar& grammar) {
   }
   if (odd.size() == 1 && odd[0].count == 0 && period > 2) {
     const double within = within_rows(survey.rows, period - 1, 0);
-    if (within > kRowsAlike) return true;  // a remark now and then
+    if (within > 0.9) return true;  // of the variance: a remark now and then
     if (within > kRowsDiffer)
       grammar.doubt = "a line " + in_quotes(first.begins) + " after every " + std::to_string(period - 1) +
                       " lines, which do not differ: each line may be a frame, or all of them one";
@@ -236,7 +181,7 @@ void find_index(const Survey& survey, TextGrammar& grammar) {
   const double low = std::ranges::min(index), high = std::ranges::max(index);
   const double size = high - low + 1;
   if (low != 0 && low != 1) return;
-  if (!(size >= 2 && size <= 64 && static_cast<double>(rows.size()) >= kFewFrames * size)) return;
+  if (!(size >= 2 && size <= 64 && static_cast<double>(rows.size()) >= 3 * size)) return;
   std::size_t steps = 0;
   for (std::size_t i = 1; i < index.size(); ++i)
     steps += index[i] == (index[i - 1] == high ? low : index[i - 1] + 1);
@@ -274,8 +219,8 @@ std::string find_checksum(const std::vector<std::string>& lines) {
     ++with, seen.insert(sum->stated);
     const std::string_view text = std::string_view(line).substr(sum->line.size() + 1);
     hex += line[sum->line.size()] == '*' || text.find_first_of("abcdefABCDEF") != std::string_view::npos;
-    for (const char* kind : {"xor8", "sum8", "crc16-modbus", "crc16-ccitt"})
-      if (sum->digits == (kind[0] == 'c' ? 4U : 2U)) fits[kind] += sum->computed(kind) == sum->stated;
+    for (const char* kind : kChecksums)
+      if (sum->digits == 2 * checksum_bytes(kind)) fits[kind] += sum->computed(kind) == sum->stated;
   }
   if (4 * with < 3 * all || seen.size() < 3) return "none";
   for (const auto& [kind, count] : fits)
@@ -312,13 +257,17 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
   if (grammar.format.checksum != "none")
     for (std::string& line : lines)
       if (const auto sum = checksum_of(line)) line = std::string(trimmed(sum->line));
-  if (const std::string hex = bare_hexadecimal(lines); !hex.empty()) {
+  bool unsure = false;
+  if (const std::string hex = bare_hexadecimal(lines, unsure); !hex.empty()) {
     grammar.doubt =
         "hexadecimal numbers without 0x, which no sensor's file can say, or decimal ones, as in " +
         in_quotes(hex.substr(0, 40));
     return grammar;
   }
-  const Commas commas = commas_of(lines);
+  if (unsure)
+    grammar.says.emplace_back(
+        "read as decimal: all numbers have as many digits, so they may be hexadecimal ones without 0x");
+  const Commas commas = commas_of(lines, ',');
   const char decimal = commas == Commas::points ? ',' : '.';
   // Cells where no number is lost in them, else numbers.
   Reading reading = read_as(lines, 0, decimal);
@@ -329,13 +278,16 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
     reading = cells;
     break;
   }
-  if (reading.numbers == 0 || reading.share < kUsual) return std::nullopt;
+  if (reading.numbers == 0 || reading.share < 0.5) return std::nullopt;
   grammar.format.separator = reading.separator, grammar.format.decimal = decimal;
   if (const Survey survey = survey_of(lines, decimal); !survey.own && !find_turns(survey, grammar))
     find_index(survey, grammar);
   if (commas == Commas::doubt)
     grammar.doubt = "a comma between digits, as in " + in_quotes(lines[lines.size() / 2].substr(0, 40)) +
                     ", may be the point of one number or stand between two (\"decimal\" says which)";
+  if (commas == Commas::thousands || commas_of(lines, '.') == Commas::thousands || blank_thousands(lines))
+    grammar.doubt = "marks before three digits, as in " + in_quotes(lines[lines.size() / 2].substr(0, 40)) +
+                    ", part thousands, or are points or parts of a list: let the sensor send plain numbers";
   if (grammar.format.lines_per_frame > 1) grammar.format.separator = 0;
   say_what_was_taken_away(raw, grammar);
 
@@ -345,11 +297,13 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
   struct Frame {
     std::vector<double> values;
     std::vector<bool> words, wall;
-    std::vector<std::string> before, text;
+    std::vector<std::string> before, text, unit;
+    std::vector<std::size_t> line;
   };
   std::vector<Frame> all;
-  double written = 0;                              // lines that are not empty
-  std::map<std::vector<bool>, std::size_t> forms;  // which cells are words
+  std::vector<std::vector<std::string>> all_words;  // lines that name what follows
+  double written = 0;                               // lines that are not empty
+  std::map<std::vector<bool>, std::size_t> forms;   // which cells are words
   for (const std::string& line : lines) {
     written += line.empty() ? 0 : 1;
     if (frames.push(line) != TextFrames::Result::frame) continue;
@@ -357,8 +311,12 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
     for (const TextSlot& slot : frames.slots()) {
       frame.values.push_back(slot.value), frame.words.push_back(slot.words), frame.wall.push_back(slot.wall);
       frame.before.emplace_back(slot.before), frame.text.emplace_back(slot.text);
+      frame.unit.emplace_back(slot.unit), frame.line.push_back(slot.line);
     }
-    if (std::ranges::count(frame.words, false) == 0) continue;
+    if (std::ranges::count(frame.words, false) == 0) {
+      all_words.push_back(std::move(frame.text));
+      continue;
+    }
     ++forms[frame.words];
     all.push_back(std::move(frame));
   }
@@ -372,9 +330,13 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
     return std::nullopt;
   const Frame& sample = all[all.size() / 2];
   grammar.words = usual, grammar.wall = sample.wall;
-  grammar.before = sample.before, grammar.sample = sample.text;
+  grammar.before = sample.before, grammar.sample = sample.text, grammar.line = sample.line;
+  for (auto& names : all_words)
+    if (names.size() == usual.size()) grammar.names = std::move(names);
+  std::map<std::vector<std::string>, std::size_t> units;
   grammar.columns.resize(usual.size()), grammar.decimals.resize(usual.size());
-  for (const Frame& frame : all)
+  for (const Frame& frame : all) {
+    ++units[frame.unit];
     for (std::size_t c = 0; c < usual.size(); ++c) {
       grammar.columns[c].push_back(frame.values[c]);
       const std::size_t point = frame.text[c].find_first_of(decimal == ',' ? ",." : ".");
@@ -382,6 +344,10 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
         grammar.decimals[c] =
             std::max(grammar.decimals[c], static_cast<int>(frame.text[c].size() - point - 1));
     }
+  }
+  if (20 * std::ranges::max_element(units, {}, [](const auto& u) { return u.second; })->second <
+      19 * all.size())
+    grammar.doubt = "the same number has another unit, or brackets, at times: what they mean is not known";
   return grammar;
 }
 

@@ -17,14 +17,12 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kBytesOfNumber = 32, kBytesBesides = 4096;  // of the longest line
-
 /// Cuts the stream into lines; one that is too long to be a frame is thrown away as it comes.
 class LineDecoder : public SensorDecoder {
  public:
   explicit LineDecoder(const Sensor& sensor) : format_(sensor.frame), count_(sensor.values()) {
     std::ranges::sort(format_.skip);
-    longest_ = kBytesBesides + 2 * kBytesOfNumber * (count_ + format_.skip.size());
+    longest_ = 4096 + 64 * (count_ + format_.skip.size());  // names and marks, and what a number takes
   }
 
   void push(std::span<const std::byte> bytes, const Sink& sink) override {

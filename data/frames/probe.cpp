@@ -17,14 +17,6 @@
 namespace supertac {
 namespace {
 
-constexpr double kMostly = 0.9, kText = 0.98;
-constexpr double kPressed = 12;   // times the noise: more than that is a finger
-constexpr double kUneven = 0.02;  // of the range: what signals may rest apart
-constexpr double kAssumedHz = 100;
-constexpr double kHeldS = 0.2, kHeldShare = 0.01;
-constexpr std::size_t kHeldFrames = 3;
-constexpr double kPressedNoise = 6, kPressedShare = 0.2, kStrong = 0.9, kLeastGain = 0.2, kMostGain = 5;
-
 // Polarity, range, noise and what never moves; into the draft where they are known.
 // What was known of a sensor stays where nothing says more than that.
 void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::optional<Sensor>& known,
@@ -64,14 +56,14 @@ void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::option
                  (known   ? ""
                   : whole ? "; whole numbers, called counts"
                           : "; set \"unit\""));
-  const bool pressed = strongest > kPressed * noise, rises = upwards || !pressed;
+  const bool pressed = strongest > 12 * noise, rises = upwards || !pressed;
   const double most = pressed ? 1.1 * strongest : std::max(20 * noise, 0.1 * std::abs(rest));
   if (known && !pressed) {
     draft.scale = known->scale;
   } else {
     draft.scale.rest = rest, draft.scale.span = rises ? -most : most;
   }
-  if (pressed ? uneven > kUneven * most : known.has_value()) {
+  if (pressed ? uneven > 0.02 * most : known.has_value()) {
     draft.rest.assign(rests.begin(), rests.end());
     says.push_back("signals rest up to " + format(uneven, 3) +
                    " apart: \"rest\" moves each to the median; probe again when they have drifted");
@@ -97,9 +89,15 @@ std::optional<FoundFormat> candidate_of(const std::string& bytes, std::span<cons
                                         const std::optional<Sensor>& known, std::vector<std::string>& says) {
   std::optional<FoundFormat> found;
   const double seconds = heard.empty() ? 0 : heard.back().time_s - heard.front().time_s;
-  const auto text_bytes = std::ranges::count_if(bytes, [](char c) {
-    return (c >= ' ' && c <= '~') || c == '\n' || c == '\r' || c == '\t' || c == '\x1B';
-  });
+  std::size_t text_bytes = 0, left = 0;  // left: of a character of UTF-8
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const auto c = static_cast<unsigned char>(bytes[i]);
+    const std::size_t more = left > 0 || c < 0xC2 || c > 0xF4 ? 0 : c < 0xE0 ? 1 : c < 0xF0 ? 2 : 3;
+    const bool goes_on = left > 0 && (c & 0xC0) == 0x80;
+    text_bytes +=
+        goes_on || more > 0 || (c >= ' ' && c <= '~') || c == '\n' || c == '\r' || c == '\t' || c == '\x1B';
+    left = goes_on ? left - 1 : more;
+  }
   // UTF-16 has a NUL beside each character; some firmware sends one with each line.
   const auto nul = static_cast<double>(std::ranges::count(bytes, '\0')),
              all = static_cast<double>(bytes.size());
@@ -111,7 +109,7 @@ std::optional<FoundFormat> candidate_of(const std::string& bytes, std::span<cons
   }
   const double printable = static_cast<double>(text_bytes), read = padded ? all - nul : all;
   std::vector<std::string> of_text, of_binary;
-  bool text = printable > kText * read;
+  bool text = printable > 0.98 * read;
   if (text) found = find_text_format(bytes, seconds, of_text);
   if (!found && printable < all) {  // values of bytes may happen to be printable
     const auto binary =
@@ -135,10 +133,10 @@ double peak_of(const HeardFrames& frames, const Sensor& sensor, std::size_t taxe
       if (i > 0) steps[i - 1] = std::hypot(steps[i - 1], double{signal[i]} - double{signal[i - 1]});
     }
   }
-  const double held = std::min(kHeldShare * static_cast<double>(frames.count), kHeldS * sensor.rate_hz);
+  const double held = std::min(0.01 * static_cast<double>(frames.count), 0.2 * sensor.rate_hz);
   std::ranges::sort(changes, std::greater());
-  const double peak = changes[std::max(static_cast<std::size_t>(held), kHeldFrames) - 1];
-  return peak > kPressedNoise * quantile(steps, 0.75) ? peak : 0;
+  const double peak = changes[std::max<std::size_t>(static_cast<std::size_t>(held), 3) - 1];
+  return peak > 6 * quantile(steps, 0.75) ? peak : 0;
 }
 
 // Who lies beside whom, from how far each taxel is from rest.
@@ -183,14 +181,16 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   report.says.push_back("heard " + std::to_string(bytes.size()) + " bytes in " + format(seconds, 1) + " s");
   Sensor rig;
   rig.port = port;
-  if (!bytes.empty() && frames_of(rig, heard).frame_bytes > kMostly * static_cast<double>(bytes.size())) {
+  const auto reads_all = [&](const Sensor& sensor) {
+    return !bytes.empty() && frames_of(sensor, heard).frame_bytes > 0.9 * static_cast<double>(bytes.size());
+  };
+  if (reads_all(rig)) {
     report.says.push_back("frames of the rig's board");
     report.draft = rig;
     return report;
   }
   // A description that reads what came knows more than what can be guessed.
-  const bool reads = known && !bytes.empty() &&
-                     frames_of(*known, heard).frame_bytes > kMostly * static_cast<double>(bytes.size());
+  const bool reads = known && reads_all(*known);
   const auto found = reads ? std::optional(FoundFormat{known->frame, known->array, "", {}})
                            : candidate_of(bytes, heard, known, report.says);
   Sensor draft = known.value_or(Sensor{.name = "probed sensor", .body = {}});
@@ -214,14 +214,14 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   if (!found->remark.empty()) report.says.push_back(found->remark);
   const double rate = static_cast<double>(frames.steps) / std::max(frames.seconds, 1e-6);
   const bool unknown_rate = seconds < kAtOnceS && !draft.frame.time;
-  draft.rate_hz = unknown_rate ? kAssumedHz : std::clamp(std::round(rate * 100) / 100, 1.0, 100'000.0);
+  draft.rate_hz = unknown_rate ? 100 : std::clamp(std::round(rate * 100) / 100, 1.0, 100'000.0);
   report.says.push_back("frames of " + std::to_string(values) + " values, " +
                         (unknown_rate ? "all at once" : format(draft.rate_hz) + " a second") +
                         (draft.frame.time
                              ? ", with a time stamp in " + format(draft.frame.time->unit_s) + " s"
                              : ", without a time stamp"));
   if (unknown_rate)
-    report.says.push_back("assumed: " + format(kAssumedHz) + " frames a second; set \"rate_hz\"");
+    report.says.push_back("assumed: " + format(draft.rate_hz) + " frames a second; set \"rate_hz\"");
   const bool nested = found->array != assumed_array(values);  // by lists of JSON, or rows of lines
   if (const FoundLayout lie = known || nested ? FoundLayout{} : layout_of(frames); lie.layout) {
     draft.array.rows = lie.layout->rows, draft.array.columns = lie.layout->columns;
@@ -247,7 +247,7 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
 ProbeReport find_gain(std::span<const Heard> heard, const Sensor& sensor) {
   const HeardFrames frames = frames_of(sensor, heard);
   ProbeReport report{{std::to_string(frames.count) + " frames to find gains from"}, {}};
-  if (frames.count <= kHeldFrames) return report;
+  if (frames.count <= 3) return report;
   Sensor found = sensor;
   found.rest.clear();
   for (std::vector<float> signal : frames.signals) found.rest.push_back(median(signal));
@@ -256,7 +256,7 @@ ProbeReport find_gain(std::span<const Heard> heard, const Sensor& sensor) {
   std::vector<double> peaks, pressed;  // of silent taxels 0
   for (int taxel = 0; taxel < sensor.array.taxels(); ++taxel)
     peaks.push_back(says(taxel) ? peak_of(frames, found, static_cast<std::size_t>(taxel)) : 0);
-  const double least = kPressedShare * quantile(std::vector(peaks), kStrong);
+  const double least = 0.2 * quantile(std::vector(peaks), 0.9);
   std::ranges::copy_if(peaks, std::back_inserter(pressed), [&](double peak) { return peak > least; });
   if (pressed.empty()) {
     report.says.emplace_back("nothing was pressed: press every taxel while it listens (--seconds)");
@@ -264,7 +264,7 @@ ProbeReport find_gain(std::span<const Heard> heard, const Sensor& sensor) {
   }
   const double usual = median(pressed);
   const auto gain_of = [&](double peak) {
-    return std::clamp(std::round(1e4 * usual / peak) / 1e4, kLeastGain, kMostGain);
+    return std::clamp(std::round(1e4 * usual / peak) / 1e4, 0.2, 5.0);
   };
   std::vector<int> weak;
   found.gain.clear();

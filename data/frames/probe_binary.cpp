@@ -14,11 +14,8 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // that are looked at: the last
-constexpr std::size_t kLongestHeader = 4, kLongestTrailer = 4, kFewRows = 8, kLongToSkip = 600,
-                      kMostSummed = 150'000'000;  // some tenths of a second
+constexpr std::size_t kLongestHeader = 4, kLongestTrailer = 4;
 constexpr double kClearLead = 8, kMostLead = 40;
-constexpr double kNever = BinaryColumns::kNever;
 
 // A byte of a header or a trailer, beside another of it (below 0 for none): what people take for them costs
 // fewer bits than other bytes, and what goes on as its neighbour does - the complement, the next number, one
@@ -115,13 +112,13 @@ class Search {
   };
 
   void find_checksums() {
-    std::size_t summed = 0;  // bytes
+    std::size_t summed = 0;  // bytes; 150 million take some tenths of a second
     for (std::size_t end = 0; end < period_; ++end)
       for (const char* kind : kChecksums) {
         const std::size_t width = checksum_bytes(kind);
         if (width == 0 || width + 3 >= period_ || columns_.constant(end) == 0) continue;
         // What stands between a checksum and where the next one begins stays the same.
-        for (std::size_t gap = 0; summed < kMostSummed && gap <= kLongestTrailer + kLongestHeader; ++gap) {
+        for (std::size_t gap = 0; summed < 150'000'000 && gap <= kLongestTrailer + kLongestHeader; ++gap) {
           if (gap > 0 && columns_.constant(end + width + gap - 1) == kNever) break;
           const std::size_t begin = end + width + gap, from = begin >= period_ ? begin - period_ : begin;
           const std::size_t to = from < end ? end : end + period_;
@@ -204,7 +201,7 @@ class Search {
   // One clock; bytes of no meaning once; and in long periods not at all, for there time counts.
   bool allowed(const FieldFound& field, const Parts& others) const {
     const bool unknown = field.field.is == FrameField::Is::skip && !field.sure;
-    if (unknown && (period_ > kLongToSkip || !others.empty())) return false;
+    if (unknown && (period_ > 600 || !others.empty())) return false;
     return std::ranges::none_of(others, [&](const FieldFound* other) {
       return (other->field.is == FrameField::Is::skip && field.field.is == FrameField::Is::skip) ||
              (other->field.is == field.field.is && field.field.is == FrameField::Is::time);
@@ -291,36 +288,24 @@ class Search {
   std::map<std::tuple<std::size_t, std::size_t, std::size_t, bool, std::size_t>, BinaryReading> best_;
 };
 
-// What came after a pause begins a frame: cost of where the pauses ended, for each byte of the period.
-std::vector<double> bits_of_starts(std::span<const Heard> heard, std::size_t first_byte,
-                                   const Stretch& stretch, double seconds, std::size_t bytes) {
-  constexpr double kMost = 30, kPause = 0.3;
-  const std::size_t period = stretch.period;
-  std::vector<std::size_t> counts(period);
-  std::size_t all = 0, at = 0;
-  double before = -1e9;
-  const double pause = kPause * seconds * static_cast<double>(period) / static_cast<double>(bytes);
-  for (const Heard& chunk : heard) {
-    const bool within =
-        at >= first_byte + stretch.begin && at < first_byte + stretch.begin + stretch.rows * period && at > 0;
-    if (within && chunk.time_s - before > pause) ++counts[(at - first_byte - stretch.begin) % period], ++all;
-    at += chunk.bytes.size(), before = chunk.time_s;
-  }
-  std::vector<double> bits(period);
-  for (std::size_t c = 0; c < period; ++c) {
-    const auto in = static_cast<double>(counts[c]), out = static_cast<double>(all - counts[c]);
-    bits[c] = bits_of_share(in, out) + out * std::log2(static_cast<double>(period));
-  }
-  const double least = std::ranges::min(bits);
-  for (double& b : bits) b = std::min(b - least, kMost);
-  // Every second time the bytes begin with a frame, and end with one.
-  const double by_chance = std::log2(static_cast<double>(period) + 1);
-  const std::size_t end = bytes - first_byte - stretch.begin;
-  for (std::size_t c = 0; c < period; ++c) {
-    if (first_byte + stretch.begin == 0 && c > 0) bits[c] += by_chance;
-    if (end < (stretch.rows + 1) * period && (end - c) % period != 0) bits[c] += by_chance;
-  }
-  return bits;
+/// Of numbers of two bytes a higher one changes, and no lower one has its highest bit.
+bool holds_seven_bits(const BinaryReading& reading, std::span<const Heard> heard) {
+  if (bytes_of(reading.format.type) != 2) return false;
+  std::vector<int> high(reading.values, -1);
+  bool changes = false, eighth = false;
+  Sensor sensor;
+  sensor.array.rows = 1, sensor.array.columns = static_cast<int>(reading.values),
+  sensor.frame = reading.format;
+  BinaryDecoder decoder(sensor);
+  for (const Heard& chunk : heard)
+    decoder.push(std::as_bytes(std::span(chunk.bytes)), [&](const DecodedFrame& frame) {
+      for (std::size_t k = 0; k < high.size(); ++k) {
+        const int value = static_cast<int>(frame.values[k]),
+                  before = std::exchange(high[k], value >> 8 & 0xFF);
+        eighth = eighth || (value & 0x80) != 0, changes = changes || (before >= 0 && before != high[k]);
+      }
+    });
+  return changes && !eighth;
 }
 
 }  // namespace
@@ -345,12 +330,12 @@ std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::op
   std::string all;
   for (const Heard& chunk : heard) all += chunk.bytes;
   const double seconds = heard.empty() ? 0 : heard.back().time_s - heard.front().time_s;
-  const std::size_t first = all.size() - std::min(all.size(), kMostBytes);
+  const std::size_t first = all.size() - std::min(all.size(), std::size_t{1} << 18);
   const Bytes bytes = Bytes(reinterpret_cast<const unsigned char*>(all.data()), all.size()).subspan(first);
   std::vector<BinaryReading> found;
   for (const std::size_t period : periods_of(bytes)) {
     const Stretch stretch = stretch_of(bytes, period);
-    if (stretch.rows < kFewRows) continue;
+    if (stretch.rows < 8) continue;
     const double share = static_cast<double>((stretch.rows - 2) * period) / static_cast<double>(all.size());
     const BinaryColumns columns(bytes, stretch, seconds < kAtOnceS ? 0 : seconds * share);
     Search(bytes, columns, bits_of_starts(heard, first, stretch, seconds, all.size()), values).run(found);
@@ -363,6 +348,16 @@ std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::op
 std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
                                                 std::optional<std::size_t> values,
                                                 std::vector<std::string>& says) {
+  std::string all;
+  for (const Heard& chunk : heard) all += chunk.bytes;
+  if (const std::string framing =
+          framing_of({reinterpret_cast<const unsigned char*>(all.data()), all.size()});
+      !framing.empty()) {
+    says.push_back("frames in " + framing +
+                   ", which replaces bytes within them: no sensor's file can say so; let "
+                   "the sensor send frames of one size");
+    return std::nullopt;
+  }
   const std::vector<BinaryReading> found = binary_readings(heard, values);
   if (found.empty() || found[0].bits > found[0].sent - kMostLead) {
     says.push_back(
@@ -370,13 +365,20 @@ std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
     return std::nullopt;
   }
   const BinaryReading& best = found[0];
-  const auto part = std::ranges::find_if(
-      found, [&](const BinaryReading& r) { return r.period < best.period && best.period % r.period == 0; });
-  const BinaryReading* second = part != found.end() ? &*part : found.size() > 1 ? &found[1] : nullptr;
-  const double lead = part != found.end() ? 0 : second != nullptr ? second->bits - best.bits : kMostLead;
-  if (lead < kClearLead || best.unknown || best.mixed || best.sign_unsure) {
+  // A part of the period is never outweighed; fewer values in the same bytes by 11 bits: what never
+  // moves at the edge is a dead taxel or a mark, and only the shape of the array speaks for one of them.
+  const auto rival = std::ranges::find_if(found, [&](const BinaryReading& r) {
+    return (r.period < best.period && best.period % r.period == 0) ||
+           (r.period == best.period && r.format.type == best.format.type && r.values < best.values &&
+            r.bits < best.bits + 11);
+  });
+  const BinaryReading* second = rival != found.end() ? &*rival : found.size() > 1 ? &found[1] : nullptr;
+  const double lead = rival != found.end() ? 0 : second != nullptr ? second->bits - best.bits : kMostLead;
+  const bool seven = holds_seven_bits(best, heard);
+  if (lead < kClearLead || best.unknown || best.mixed || best.sign_unsure || seven) {
     says.push_back("it may be: " + best.text());
     if (best.mixed) says.push_back("but its fields have two byte orders, which no sensor's file can say");
+    if (seven) says.push_back("but its bytes hold seven bits each, which no sensor's file can say");
     if (best.sign_unsure) says.push_back("but whether its numbers have a sign cannot be told");
     if (best.unknown)
       says.push_back("but some bytes have no meaning that is known, such as another checksum");

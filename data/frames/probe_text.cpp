@@ -16,32 +16,20 @@
 namespace supertac {
 namespace {
 
-constexpr double kClock = 0.25;  // how far the host's clock and the sensor's may differ in a probe
-constexpr std::size_t kMostRestarts = 2, kStepsOfRestart = 20;  // noise falls far more often
-constexpr double kRestarted = 0.3;    // of the time at least a clock runs that starts anew meanwhile
-constexpr std::size_t kFewLines = 3;  // of which nothing can be said
-
 struct Lines {
   std::vector<std::string> text;  // clean
   std::vector<std::string> raw;   // empty ones too
   double seconds = 0;             // from the first to the last
 };
 
-// Whole ones: the first and the last may be torn.
+// Whole ones; the first may be torn, or name what follows.
 Lines lines_of(const std::string& bytes, double seconds) {
   Lines lines{.text = {}, .raw = {}, .seconds = seconds};
-  for (std::size_t at = bytes.find('\n'); at != std::string::npos;) {
-    const std::size_t end = bytes.find('\n', at + 1);
-    if (end == std::string::npos) break;
-    lines.raw.push_back(bytes.substr(at + 1, end - at - 1));
+  for (std::size_t at = 0, end; (end = bytes.find('\n', at)) != std::string::npos; at = end + 1) {
+    lines.raw.push_back(bytes.substr(at, end - at));
     if (std::string clean = clean_line(lines.raw.back()); !clean.empty())
       lines.text.push_back(std::move(clean));
-    at = end;
   }
-  // What waited, and marks of Unicode, stand before the first line feed.
-  if (!lines.raw.empty() &&
-      (bytes.starts_with("\xFF\xFE") || bytes.starts_with("\xFE\xFF") || bytes.starts_with("\xEF\xBB\xBF")))
-    lines.raw.insert(lines.raw.begin(), bytes.substr(0, bytes.find('\n')));
   return lines;
 }
 
@@ -49,21 +37,6 @@ bool from_printer(std::string_view line) {
   for (const char* begin : {"ok", "echo:", "Error:", "start", "//", "!!", "T:", "Grbl"})
     if (line.starts_with(begin)) return true;
   return false;
-}
-
-// From each value to the next.
-struct Steps {
-  double went = 0, longest = 0;  // upwards
-  std::size_t fell = 0, rose = 0;
-};
-Steps steps_of(std::span<const double> values) {
-  Steps steps;
-  for (std::size_t i = 1; i < values.size(); ++i) {
-    const double step = values[i] - values[i - 1];
-    if (step < 0) ++steps.fell;
-    if (step > 0) ++steps.rose, steps.went += step, steps.longest = std::max(steps.longest, step);
-  }
-  return steps;
 }
 
 // A list of slots as "0 to 3, 7".
@@ -88,6 +61,7 @@ std::optional<FoundFormat> found_by_roles(TextGrammar& grammar, double seconds,
   FoundFormat found{.format = grammar.format, .array = {}, .remark = {}};
   std::vector<std::pair<std::string, std::vector<int>>> said;
   std::size_t values = 0;
+  std::map<std::size_t, std::size_t> rows;  // the values in each line of a frame
   for (std::size_t c = 0; c < roles.size(); ++c) {
     const int column = static_cast<int>(c);
     const SlotRole& role = roles[c];
@@ -95,7 +69,8 @@ std::optional<FoundFormat> found_by_roles(TextGrammar& grammar, double seconds,
       found.format.time = FrameTime{.column = column, .unit_s = role.unit_s};
     else if (role.kind != SlotRole::signal && role.kind != SlotRole::constant)
       found.format.skip.push_back(column);
-    else if (++values; std::ranges::all_of(grammar.columns[c], [](double v) { return std::isnan(v); }))
+    else if (++values, ++rows[c < grammar.line.size() ? grammar.line[c] : 0];
+             std::ranges::all_of(grammar.columns[c], [](double v) { return std::isnan(v); }))
       found.dead.push_back(static_cast<int>(values) - 1);
     const std::string what = std::string(kNames[role.kind]) + ": " + role.why;
     const auto known = std::ranges::find(said, what, [](const auto& s) { return s.first; });
@@ -108,7 +83,9 @@ std::optional<FoundFormat> found_by_roles(TextGrammar& grammar, double seconds,
                    ": " + said[i].first);
   if (said.size() > kMostSaid)
     says.push_back("and " + std::to_string(said.size() - kMostSaid) + " more roles");
-  const auto array = values == 0 ? std::nullopt : assumed_array(values);
+  const auto channels = static_cast<std::size_t>(grammar.channels);
+  auto array = values == 0 ? std::nullopt : assumed_array(values / channels);
+  if (array) array->channels = grammar.channels;
   if (!grammar.doubt.empty()) {
     says.push_back("two readings explain this alike: " + grammar.doubt +
                    "; no draft is written: give the sensor's file, with \"lines_per_frame\" and \"skip\"");
@@ -116,12 +93,10 @@ std::optional<FoundFormat> found_by_roles(TextGrammar& grammar, double seconds,
   }
   if (!array) return std::nullopt;
   found.array = *array;
-  if (grammar.format.lines_per_frame > 1 &&
-      values % static_cast<std::size_t>(grammar.format.lines_per_frame) == 0) {
-    const std::size_t rows = static_cast<std::size_t>(grammar.format.lines_per_frame);
-    if (const std::size_t sides[] = {rows, values / rows}; rows <= 64 && sides[1] > 1 && sides[1] <= 64)
-      found.array = {.rows = static_cast<int>(rows), .columns = static_cast<int>(sides[1])};
-  }
+  std::size_t longest = 0;
+  for (const auto& [line, count] : rows) longest = std::max(longest, count);
+  if (rows.size() > 1 && rows.size() <= 64 && longest > 1 && longest <= 64 && longest * rows.size() == values)
+    found.array = {.rows = static_cast<int>(rows.size()), .columns = static_cast<int>(longest)};
   if (grammar.format.lines_per_frame > 1)
     found.remark = "a frame is " + std::to_string(grammar.format.lines_per_frame) + " lines, " +
                    (grammar.format.prefix.empty() ? "behind an empty line"
@@ -150,7 +125,7 @@ std::optional<FoundFormat> objects_of(const Lines& lines, std::vector<std::strin
   std::map<std::string, std::vector<std::vector<double>>> arrays;
   std::vector<std::size_t> nested;
   FoundFormat candidate{.format = {.kind = FrameKind::json}, .array = {}, .remark = {}};
-  std::size_t most = 0, parsed = 0;
+  std::size_t most = 0, parsed = 0, stamped = 0;
   using Pointer = nlohmann::ordered_json::json_pointer;
   const std::function<void(const Pointer&, const nlohmann::ordered_json&)> look =
       [&](const Pointer& place, const nlohmann::ordered_json& value) {
@@ -168,12 +143,16 @@ std::optional<FoundFormat> objects_of(const Lines& lines, std::vector<std::strin
         sizes_of(value, nested);
       };
   for (const std::string& line : lines.text) try {
-      const auto json = parse_json_limited(behind_stamp(line));
+      const std::string_view content = behind_stamp(line);
+      const auto json = parse_json_limited(content);
       if (json.is_structured()) look(Pointer(), json);
+      stamped += content.size() < line.size();
       ++parsed;
     } catch (const JsonError&) {  // no line of this kind
     }
-  if (static_cast<double>(parsed) < 0.5 * static_cast<double>(lines.text.size()) || most == 0)
+  // Of a bare array behind a time of day the columns tell more.
+  if (2 * parsed < lines.text.size() || most == 0 ||
+      (candidate.format.values.empty() && 2 * stamped > parsed))
     return std::nullopt;
   // The places of a flat array are slots as well.
   std::vector<std::vector<double>>& frames = arrays[candidate.format.values];
@@ -244,30 +223,10 @@ std::optional<TaxelArray> assumed_array(std::size_t values, std::span<const std:
   return std::nullopt;
 }
 
-std::optional<double> unit_of_clock(std::span<const double> stamps, double seconds) {
-  if (stamps.size() < kFewLines) return std::nullopt;
-  // A clock may start anew while one listens, and stands still meanwhile; of what waited before one listened,
-  // some may come first. Stamps of a clock that is coarser than the frames are the same for several.
-  const auto [went, longest, fell, rose] = steps_of(stamps);
-  if (fell > std::min(kMostRestarts, stamps.size() / kStepsOfRestart) || 2 * rose < stamps.size() - 1)
-    return std::nullopt;
-  if (seconds < kAtOnceS) {  // a file says nothing of the time it took: a clock of milliseconds, or a counter
-    const bool whole = std::ranges::all_of(stamps, [](double v) { return v == std::round(v); });
-    if (fell > 0 || went == static_cast<double>(stamps.size() - 1)) return std::nullopt;
-    return whole ? 1e-3 : 1;
-  }
-  for (const double jump : {0.0, longest})
-    for (const double unit : {1.0, 1e-3, 1e-6}) {
-      const double ratio = (went - jump) * unit / seconds;
-      if (ratio > (fell > 0 ? kRestarted : 1 - kClock) && ratio < 1 + kClock) return unit;
-    }
-  return std::nullopt;
-}
-
 std::optional<FoundFormat> find_text_format(const std::string& bytes, double seconds,
                                             std::vector<std::string>& says) {
   const Lines lines = lines_of(bytes, seconds);
-  if (lines.text.size() < kFewLines) {
+  if (lines.text.size() < 3) {
     says.push_back(bytes.find('\n') == std::string::npos
                        ? "no line ends in this text: a sensor ends each frame with a line feed"
                        : "too few lines; probe for longer (--seconds)");

@@ -14,9 +14,7 @@
 namespace supertac {
 namespace {
 
-constexpr double kMost = 0.9;
 constexpr std::size_t kFew = 12;  // frames: of less nothing can be said
-constexpr double kModuli[] = {0, 10, 16, 32, 64, 100, 128, 256, 1000, 1024, 4096, 10000, 65536, 4294967296.0};
 
 bool whole(const std::vector<double>& v) {
   return std::ranges::all_of(v, [](double x) { return x == std::round(x); });
@@ -39,12 +37,18 @@ std::vector<double> steps(const std::vector<double>& v, double modulus) {
 bool counts(const std::vector<double>& v) {
   if (v.size() < kFew || !whole(v) || constant(v)) return false;
   const double high = std::ranges::max(v), low = std::ranges::min(v);
-  for (const double modulus : kModuli) {
+  for (const double modulus : {0.0, 10.0, 16.0, 32.0, 64.0, 100.0, 128.0, 256.0, 1000.0, 1024.0, 4096.0,
+                               10000.0, 65536.0, 4294967296.0}) {
     if (modulus > 0 && (high >= modulus || low < 0 || high - low < 0.5 * modulus)) continue;
-    std::size_t one = 0, few = 0;
-    for (const double step : steps(v, modulus)) one += step == 1, few += step >= 1 && step <= 20;
+    std::size_t one = 0, few = 0, wraps = 0, short_of = 0;
+    for (std::size_t i = 1; i < v.size(); ++i) {
+      const bool fell = modulus > 0 && v[i] < v[i - 1];
+      const double step = v[i] - v[i - 1] + (fell ? modulus : 0);
+      one += step == 1, few += step >= 1 && step <= 20, wraps += fell, short_of += fell && step != 1;
+    }
+    if (2 * short_of > wraps) continue;  // it begins anew before
     const auto all = static_cast<double>(v.size() - 1);
-    if (static_cast<double>(few) >= kMost * all && 2 * static_cast<double>(one) > all) return true;
+    if (static_cast<double>(few) >= 0.9 * all && 2 * static_cast<double>(one) > all) return true;
   }
   return false;
 }
@@ -149,7 +153,7 @@ std::string sum_of_values(const TextGrammar& grammar, std::size_t slot) {
                                           : sum;
         fits += made == stated[i];
       }
-      if (static_cast<double>(fits) >= kMost * static_cast<double>(stated.size()))
+      if (static_cast<double>(fits) >= 0.9 * static_cast<double>(stated.size()))
         return (modulus < 0 ? "xor" : "sum") + std::string(modulus > 0 ? " modulo " + format(modulus) : "") +
                " of slots " + std::to_string(first) + " to " + std::to_string(slot - 1) + ", computed again";
     }
@@ -192,18 +196,6 @@ SlotRole role_of(TextGrammar& g, std::size_t c, double seconds, bool clock) {
   return {SlotRole::other, "only rises"};
 }
 
-/// Rows of a frame of several lines: the number that each begins with.
-void label_rows(const TextGrammar& g, std::vector<SlotRole>& roles) {
-  const auto lines = static_cast<std::size_t>(g.format.lines_per_frame);
-  const std::size_t n = roles.size(), width = n / lines;
-  if (lines < 2 || n % lines != 0 || width < 2) return;
-  for (std::size_t r = 0; r < lines; ++r)
-    if (!constant(g.columns[r * width]) ||
-        (r > 0 && g.columns[r * width][0] != g.columns[(r - 1) * width][0] + 1))
-      return;
-  for (std::size_t r = 0; r < lines; ++r) roles[r * width] = {SlotRole::label, "the row of its line"};
-}
-
 bool candidate(const SlotRole& role) {
   return role.kind == SlotRole::signal || role.kind == SlotRole::constant;
 }
@@ -214,12 +206,31 @@ std::vector<std::size_t> candidates(const std::vector<SlotRole>& roles) {
   return all;
 }
 
-/// Numbers named otherwise than most are no taxels of the array.
+/// Numbers that count the rows or the taxels: in turn with others a constant, one more each time.
+void find_counts(const TextGrammar& g, std::vector<SlotRole>& roles) {
+  const std::vector<std::size_t> all = candidates(roles);
+  const std::size_t lines = g.format.lines_per_frame == 2 ? 2 : 3;  // at least
+  for (std::size_t width = 2; lines * width <= all.size(); ++width)
+    for (std::size_t place = 0; all.size() % width == 0 && place < width; ++place) {
+      bool counted = true;
+      for (std::size_t i = place; counted && i < all.size(); i += width)
+        counted = constant(g.columns[all[i]]) &&
+                  (i == place || g.columns[all[i]][0] == g.columns[all[i - width]][0] + 1);
+      for (std::size_t i = place; counted && i < all.size(); i += width)
+        roles[all[i]] = {SlotRole::label, "counts the rows, or the taxels"};
+    }
+}
+
+/// Numbers named otherwise than most are no taxels of the array. Names that take turns are a taxel's
+/// channels; others of as many numbers each are other quantities, unless they are the letters of the rows.
 void compare_names(TextGrammar& g, std::vector<SlotRole>& roles) {
   std::map<std::string, std::vector<std::size_t>> named;
+  std::vector<std::string> names;  // of the candidates, in turn
   std::string name;
   for (std::size_t c = 0; c < roles.size(); ++c) {
-    if (g.format.separator != 0) {
+    if (!g.names.empty()) {
+      name = stem(g.names[c]);
+    } else if (g.format.separator != 0) {
       if (g.words[c] && !stem(g.sample[c]).empty()) name = stem(g.sample[c]);
     } else if (candidate(roles[c])) {
       const std::string own = stem(g.before[c]);
@@ -229,15 +240,29 @@ void compare_names(TextGrammar& g, std::vector<SlotRole>& roles) {
     if (candidate(roles[c])) named[name].push_back(c);
   }
   if (named.size() < 2) return;
-  const auto& largest = *std::ranges::max_element(named, {}, [](const auto& e) { return e.second.size(); });
+  const auto largest = *std::ranges::max_element(named, {}, [](const auto& e) { return e.second.size(); });
   for (const auto& [label, slots] : named)
     if (4 * slots.size() <= largest.second.size() || (slots.size() == 1 && largest.second.size() >= 4))
       for (const std::size_t c : slots)
         roles[c] = {SlotRole::other, "named " + in_quotes(label) + " unlike the others"};
-    else if (slots.size() != largest.second.size())
-      g.doubt = std::to_string(slots.size()) + " numbers named " + in_quotes(label) + " beside " +
-                std::to_string(largest.second.size()) + " named " + in_quotes(largest.first) +
-                ": one array, or two quantities";
+  std::erase_if(named, [&](const auto& e) { return !candidate(roles[e.second[0]]); });
+  if (named.size() < 2) return;
+  const std::size_t kinds = named.size(), each = largest.second.size();
+  bool alike = true, turns = kinds <= 8 && each > 1, rows = true;
+  char letter = 'a';
+  for (const auto& [label, slots] : named) {
+    alike = alike && slots.size() == each, rows = rows && label.size() == 1 && lower(label[0]) == letter++;
+    for (std::size_t i = 1; turns && i < slots.size(); ++i)
+      turns = slots[i] == slots[i - 1] + slots[1] - slots[0];
+    turns = turns && slots.back() > named.begin()->second[0] &&
+            slots[0] < named.begin()->second[0] + slots[1] - slots[0];
+  }
+  if (alike && turns && !rows)
+    g.channels = static_cast<int>(kinds);
+  else if (!alike || !rows)
+    g.doubt = "numbers named " + joined(named, " and ", [](const auto& e) { return in_quotes(e.first); }) +
+              ", " + joined(named, " and ", [](const auto& e) { return std::to_string(e.second.size()); }) +
+              " of them: one array, or several quantities";
 }
 
 /// Nor are a few that are written with other decimals.
@@ -295,6 +320,33 @@ void look_at_edges(TextGrammar& g, std::vector<SlotRole>& roles) {
 
 }  // namespace
 
+std::optional<double> unit_of_clock(std::span<const double> stamps, double seconds) {
+  if (stamps.size() < 3) return std::nullopt;
+  // A clock may start anew while one listens, and stands still meanwhile; of what waited before one listened,
+  // some may come first. Stamps of a clock that is coarser than the frames are the same for several.
+  double went = 0, longest = 0;  // upwards
+  std::size_t fell = 0, rose = 0;
+  for (std::size_t i = 1; i < stamps.size(); ++i) {
+    const double step = stamps[i] - stamps[i - 1];
+    fell += step<0, rose += step> 0;
+    went += std::max(step, 0.0), longest = std::max(longest, step);
+  }
+  if (fell > std::min<std::size_t>(2, stamps.size() / 20) || 2 * rose < stamps.size() - 1)
+    return std::nullopt;
+  if (seconds < kAtOnceS) {  // a file says nothing of the time it took
+    const bool whole = std::ranges::all_of(stamps, [](double v) { return v == std::round(v); });
+    if (fell > 0 || went == static_cast<double>(stamps.size() - 1)) return std::nullopt;
+    const double unit = unit_of_step(went / static_cast<double>(stamps.size() - 1), whole);
+    return unit > 0 ? std::optional(unit) : std::nullopt;
+  }
+  for (const double jump : {0.0, longest})
+    for (const double unit : {1.0, 1e-3, 1e-6}) {
+      const double ratio = (went - jump) * unit / seconds;
+      if (ratio > (fell > 0 ? 0.3 : 0.75) && ratio < 1.25) return unit;
+    }
+  return std::nullopt;
+}
+
 std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
   std::vector<SlotRole> roles;
   bool clock = false;
@@ -305,12 +357,17 @@ std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
   if (const auto clocks = std::ranges::count(roles, SlotRole::clock, &SlotRole::kind); clocks > 2)
     g.doubt =
         std::to_string(clocks) + " slots rise steadily: clocks, or signals that drift; listen for longer";
-  label_rows(g, roles);
+  find_counts(g, roles);
   if (candidates(roles).empty()) return roles;
   compare_names(g, roles);
   compare_decimals(g, roles);
   look_at_edges(g, roles);
   const std::size_t values = candidates(roles).size();
+  for (std::size_t c = 0; c < roles.size() && values == 1; ++c)
+    if (roles[c].kind == SlotRole::counter && cycles(g.columns[c]))
+      g.doubt = "slot " + std::to_string(c) +
+                " runs through the same numbers again and again beside one value: the taxel that a line is "
+                "of, or a counter";
   if (values > 8 && neat(values) == 1)
     for (const std::size_t less : {1U, 2U})
       if (g.doubt.empty() && neat(values - less) == 3)

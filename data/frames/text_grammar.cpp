@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <chrono>
 #include <cmath>
-#include <limits>
 
 #include "data/frames/binary_decoder.h"
 #include "io/numbers/numbers.h"
@@ -14,8 +12,6 @@
 
 namespace supertac {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 bool digit(char c) { return c >= '0' && c <= '9'; }
 bool letter(char c) { return (lower(c) >= 'a' && lower(c) <= 'z') || c == '_'; }
@@ -88,6 +84,12 @@ bool no_value(std::string_view text) {
   return std::ranges::find(kNone, small) != kNone.end();
 }
 
+/// Whether a mark at i, behind a digit, parts thousands: three digits follow, and no fourth.
+bool thousands(std::string_view text, std::size_t i) {
+  return i > 0 && digit(text[i - 1]) && digit(at(text, i + 1)) && digit(at(text, i + 2)) &&
+         digit(at(text, i + 3)) && !digit(at(text, i + 4));
+}
+
 /// The number from i on; i behind it.
 std::optional<double> number_at(std::string_view text, std::size_t& i, char decimal) {
   std::size_t k = i;
@@ -106,7 +108,10 @@ std::optional<double> number_at(std::string_view text, std::size_t& i, char deci
   std::string plain = at(text, i) == '-' ? "-" : "";
   const std::size_t begin = plain.size();
   const auto take = [&] {
-    while (digit(at(text, k))) plain += text[k++];
+    while (digit(at(text, k)) || (at(text, k) == '\'' && thousands(text, k))) {
+      if (digit(text[k])) plain += text[k];
+      ++k;
+    }
   };
   take();
   const bool whole = plain.size() > begin;
@@ -117,9 +122,9 @@ std::optional<double> number_at(std::string_view text, std::size_t& i, char deci
     take();
   }
   if (plain.size() == begin) return std::nullopt;
-  if (lower(at(text, k)) == 'e') {
+  if (const char mark = lower(at(text, k)); mark == 'e' || mark == 'd') {
     const std::size_t power = k + 1 + (at(text, k + 1) == '-' || at(text, k + 1) == '+' ? 1 : 0);
-    if (digit(at(text, power))) {
+    if (digit(at(text, power)) && (mark == 'e' || power > k + 1)) {
       plain += 'e';
       if (at(text, k + 1) == '-') plain += '-';
       k = power;
@@ -139,7 +144,7 @@ std::optional<double> number_at(std::string_view text, std::size_t& i, char deci
 
 /// A cell as a number, with nothing around it.
 TextSlot cell_of(std::string_view cell, char decimal) {
-  TextSlot slot{.value = kNaN, .text = cell, .before = {}};
+  TextSlot slot{.value = std::nan(""), .text = cell, .before = {}, .unit = {}};
   std::size_t end = 0, wall_end = 0;
   if (const auto number = number_at(cell, end, decimal); number && end == cell.size())
     slot.value = *number;
@@ -187,6 +192,8 @@ std::string clean_line(std::string_view line) {
     if (line[i] == '\0') continue;
     if (line.substr(i, 3) == "\xEF\xBB\xBF") {
       i += 2;
+    } else if (line.substr(i, 3) == "\xE2\x88\x92") {
+      clean += '-', i += 2;  // the minus of Unicode
     } else if (line[i] == '\xFF' || line[i] == '\xFE') {
       continue;  // of UTF-16
     } else if (line[i] == '\x1B' && at(line, i + 1) == '[') {
@@ -221,7 +228,7 @@ std::vector<TextSlot> slots_of(std::string_view line, char separator, char decim
       if (const auto number = number_at(line, i, decimal)) slot.value = *number, found = true;
     }
     if (!found && boundary && (!slots.empty() || lower(line[i]) == 'n') && none_at(line, i))
-      slot.value = kNaN, found = true;
+      slot.value = std::nan(""), found = true;
     if (!found) {
       if (word(line[i]) || line[i] == '.')
         while (i < line.size() && (word(line[i]) || line[i] == '.')) ++i;
@@ -231,8 +238,11 @@ std::vector<TextSlot> slots_of(std::string_view line, char separator, char decim
     }
     const std::size_t text = lists(line[begin]) ? begin + 1 : begin;
     slot.text = line.substr(text, i - text), slot.before = line.substr(behind, text - behind);
+    const std::size_t end = i;
+    while (i < line.size() && (letter(line[i]) || static_cast<unsigned char>(line[i]) > 127)) ++i;
+    slot.unit =
+        slot.before.ends_with('(') && at(line, i) == ')' ? line.substr(i, 1) : line.substr(end, i - end);
     slots.push_back(slot);
-    while (i < line.size() && letter(line[i])) ++i;  // its unit
     behind = i;
   }
   return slots;
@@ -268,26 +278,6 @@ unsigned TextChecksum::computed(const std::string& kind) const {
   return checksum_of(kind, std::as_bytes(std::span(line.substr(line.starts_with('$') ? 1 : 0))));
 }
 
-std::string bare_hexadecimal(const std::vector<std::string>& lines) {
-  std::size_t alike = 0;
-  std::string sample;
-  for (const std::string& line : lines) {
-    std::size_t width = 0, run = 0;
-    bool hex = true, letters = false;
-    for (const unsigned char c : line + " ") {
-      if (std::isxdigit(c) != 0) {
-        ++run, letters = letters || c > '9';
-      } else {
-        hex = hex && std::isalnum(c) == 0 && (run == 0 || width == 0 || run == width);
-        width = run > 0 ? run : width, run = 0;
-      }
-    }
-    hex = hex && width > 1, alike += hex;
-    if (hex && letters) sample = line;
-  }
-  return 10 * alike > 9 * lines.size() ? sample : "";
-}
-
 TextFrames::Result TextFrames::push(std::string_view raw) {
   std::string line = clean_line(raw);
   const std::string_view content = format_.lines_per_frame > 1 ? behind_stamp(line) : line;
@@ -310,10 +300,9 @@ TextFrames::Result TextFrames::push(std::string_view raw) {
   lines_.push_back(many ? std::string(behind_stamp(line)) : line);
   if (static_cast<int>(lines_.size()) < format_.lines_per_frame) return begins ? before : Result::nothing;
   slots_.clear();
-  for (const std::string& of : lines_) {
-    const auto more = slots_of(of, format_.separator, format_.decimal);
-    slots_.insert(slots_.end(), more.begin(), more.end());
-  }
+  for (std::size_t of = 0; of < lines_.size(); ++of)
+    for (TextSlot& slot : slots_of(lines_[of], format_.separator, format_.decimal))
+      slot.line = of, slots_.push_back(slot);
   open_ = false;
   return Result::frame;
 }

@@ -17,6 +17,8 @@ struct TextSlot {
   double value = 0;
   std::string_view text;    ///< as written
   std::string_view before;  ///< the template from the slot before to this one
+  std::string_view unit;    ///< letters right behind it, or ")" where it stands between brackets of its own
+  std::size_t line = 0;     ///< of its frame
   bool words = false;       ///< a cell that is no number
   bool wall = false;        ///< HH:MM:SS of a day, or with a date seconds since 1970
 };
@@ -26,7 +28,8 @@ struct TextSlot {
 std::string clean_line(std::string_view line);
 
 /// The slots of a clean line. With a separator the cells between them (quotes taken away); with separator 0
-/// every number: sign, exponent, 0x, units behind it, labels and brackets around it. `decimal`: '.' or ','.
+/// every number: sign, exponent (of Fortran too), 0x, thousands parted by "'", units behind it, labels and
+/// brackets around it. `decimal`: '.' or ','.
 std::vector<TextSlot> slots_of(std::string_view line, char separator, char decimal);
 
 /// The line behind a wall time in front, and the "->" of a serial monitor.
@@ -41,9 +44,22 @@ struct TextChecksum {
 };
 std::optional<TextChecksum> checksum_of(std::string_view line);
 
-/// A line, where nine in ten are hexadecimal numbers of one width without a mark, and some have letters.
-/// Empty else.
-std::string bare_hexadecimal(const std::vector<std::string>& lines);
+enum class Commas { lists, points, doubt, thousands };
+
+/// Whether marks (',' or '.') glued between digits, "1,5", are points. They are not where "," also parts such
+/// numbers. What stands behind a point is digits. Of places where they have one width w > 1 some begin with
+/// 0, as a number behind a comma does not, for which the first digits of many are all others; of one digit
+/// all ten come; of places with several widths none end in 0, as some numbers do. What fits neither is a
+/// doubt. Places that have three such digits or none part thousands.
+Commas commas_of(const std::vector<std::string>& lines, char mark);
+
+/// Whether blanks within the cells of a list part thousands.
+bool blank_thousands(const std::vector<std::string>& lines);
+
+/// A line with hexadecimal numbers without a mark: at a place of it numbers of one width have letters at
+/// times, and at times have none. Empty where there are none; `unsure`: nor are there letters, but all
+/// numbers have one width, and fewer than ten digits end them.
+std::string bare_hexadecimal(const std::vector<std::string>& lines, bool& unsure);
 
 /// Frames of one or several lines, line by line.
 class TextFrames {
@@ -73,6 +89,9 @@ struct TextGrammar {
   FrameFormat format;                        ///< of kind text, without time and skip
   std::vector<std::vector<double>> columns;  ///< [slot][frame]
   std::vector<std::string> before, sample;   ///< of each slot: template before it, how it is written
+  std::vector<std::string> names;            ///< of each slot, from a line of words; empty: there is none
+  std::vector<std::size_t> line;             ///< of each slot, in its frame
+  int channels = 1;                          ///< that names tell apart, of each taxel in turn
   std::vector<int> decimals;                 ///< behind the point, at most; of each slot
   std::vector<bool> words, wall;             ///< of each slot
   std::vector<std::string> says;

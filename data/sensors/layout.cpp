@@ -12,8 +12,7 @@ namespace supertac {
 namespace {
 
 constexpr int kMostSide = 64;
-constexpr std::size_t kParts = 8, kMostTimes = 1000;
-constexpr double kErrors = 3;
+constexpr std::size_t kParts = 8;
 
 using Pairs = std::set<std::pair<int, int>>;   // of places in the frame
 using Parts = std::array<double, kParts + 1>;  // the whole, and without each part
@@ -60,7 +59,7 @@ struct Felt {
     return sums;
   }
   explicit Felt(std::span<const std::vector<float>> from) {
-    const std::size_t frames = from[0].size(), together = frames / kMostTimes + 1;
+    const std::size_t frames = from[0].size(), together = frames / 1000 + 1;
     signals.assign(from.size(), std::vector<double>(frames / together + 1));
     std::vector<float> frame(from.size());
     for (std::size_t i = 0; i < frames; ++i) {
@@ -134,10 +133,10 @@ FoundLayout find_layout(std::span<const std::vector<float>> signals) {
   for (std::size_t c = 1; c < candidates.size(); ++c)
     if (const double errors = lead(best.score, candidates[c].score); errors < least)
       least = errors, next = &candidates[c];
-  if (!(least > kErrors))
+  if (!(least > 3))
     return {{},
             "neighbours do not tell the layout" +
-                (next == nullptr || !(lead(best.score, {}) > kErrors)
+                (next == nullptr || !(lead(best.score, {}) > 3)
                      ? ""
                      : ": " + best.layout.text() + ", or " + next->layout.text()) +
                 "; press all of the array, here and there, for longer"};

@@ -5,39 +5,32 @@
 #include <limits>
 
 namespace supertac {
-namespace {
-
-constexpr double kMeanS = 0.2, kFreeS = 1, kMostStepS = 1;
-constexpr double kBand = 0.03, kMostBand = 0.15, kGrowthPerS = 2e-4, kMargin = 1.25;
-
-}  // namespace
-
 RestTracker::RestTracker(const Sensor& sensor)
     : scale_(sensor.scale),
       either_way_(sensor.array.channels == 3),
       time_constant_s_(sensor.follow_rest_s),
       before_s_(std::numeric_limits<double>::quiet_NaN()),
-      band_(kMostBand),
+      band_(0.15),
       mean_(sensor.array.signals(), std::numeric_limits<double>::quiet_NaN()),
       rate_(sensor.array.signals(), 0),
       rest_(sensor.array.signals(), sensor.scale.rest) {}
 
 void RestTracker::follow(double time_s, std::span<float> signals) {
   if (time_constant_s_ == 0) return;
-  const double dt = std::isnan(before_s_) ? 0 : std::clamp(time_s - before_s_, 0.0, kMostStepS);
+  const double dt = std::isnan(before_s_) ? 0 : std::clamp(time_s - before_s_, 0.0, 1.0);
   before_s_ = time_s;
   double away = 0;
   for (std::size_t s = 0; s < signals.size(); ++s) {
     const double signal = double{signals[s]};
     if (!std::isfinite(signal)) continue;
-    mean_[s] = std::isnan(mean_[s]) ? signal : mean_[s] + std::min(1.0, dt / kMeanS) * (signal - mean_[s]);
+    mean_[s] = std::isnan(mean_[s]) ? signal : mean_[s] + std::min(1.0, dt / 0.2) * (signal - mean_[s]);
     const double pressed = (rest_[s] - mean_[s]) / scale_.span;
     away = std::max(away, either_way_ ? std::abs(pressed) : pressed);
   }
   free_s_ = away < band_ ? free_s_ + dt : 0;
-  if (free_s_ == 0) band_ = std::min(kMostBand, band_ + std::max(kGrowthPerS, kMargin * fastest_) * dt);
-  if (free_s_ > kFreeS) {
-    band_ = std::max(kBand, std::min(band_, kMargin * away));
+  if (free_s_ == 0) band_ = std::min(0.15, band_ + std::max(2e-4, 1.25 * fastest_) * dt);
+  if (free_s_ > 1) {
+    band_ = std::max(0.03, std::min(band_, 1.25 * away));
     const double share = std::min(1.0, dt / time_constant_s_);
     fastest_ = 0;
     for (std::size_t s = 0; s < signals.size(); ++s) {

@@ -52,9 +52,9 @@ struct FrameField {
 };
 
 /// Checksums of all bytes from FrameFormat::checksum_from to its own: sums of bytes, their exclusive or, CRCs
-/// (8: polynomial 0x07 from 0; 16: as Modbus, or CCITT-FALSE; 32: as in Ethernet).
-inline constexpr const char* kChecksums[] = {"none", "sum8",         "xor8",        "sum16",
-                                             "crc8", "crc16-modbus", "crc16-ccitt", "crc32"};
+/// (8: polynomial 0x07 from 0; 16: as Modbus, or 0x1021 from 0xFFFF, CCITT-FALSE, or from 0; 32: Ethernet's).
+inline constexpr const char* kChecksums[] = {"none",         "sum8",        "xor8",         "sum16", "crc8",
+                                             "crc16-modbus", "crc16-ccitt", "crc16-xmodem", "crc32"};
 
 /// How a frame is written. Its values stand in the order that Sensor::order names.
 struct FrameFormat {

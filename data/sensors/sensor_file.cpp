@@ -235,11 +235,10 @@ Json json_of(const FrameFormat& f) {
 }  // namespace
 
 std::string hex_of_bytes(const std::string& bytes) {
-  constexpr char kDigits[] = "0123456789ABCDEF";
   std::string hex;
   for (const char c : bytes) {
     const auto byte = static_cast<unsigned char>(c);
-    hex += kDigits[byte >> 4], hex += kDigits[byte & 15];
+    for (const int nibble : {byte >> 4, byte & 15}) hex += "0123456789ABCDEF"[nibble];
   }
   return hex;
 }

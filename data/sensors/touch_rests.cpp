@@ -9,8 +9,6 @@ namespace supertac {
 
 std::vector<double> rests_between_touches(std::span<const std::vector<float>> signals, int channels,
                                           bool rises) {
-  constexpr double kFree = 0.1, kDeviations = 4;
-  constexpr double kQuarterOfSteps = 0.4506;  // of two normal numbers' difference, in their deviations
   const std::size_t frames = signals.empty() ? 0 : signals.front().size();
   std::vector<double> total(frames), steps;
   for (const std::vector<float>& signal : signals) {
@@ -23,8 +21,9 @@ std::vector<double> rests_between_touches(std::span<const std::vector<float>> si
   }
   for (std::size_t f = 1; f < frames; ++f) steps.push_back(std::abs(total[f] - total[f - 1]));
   std::vector<double> sorted = total;
-  const double noise = steps.empty() ? 0 : quantile(steps, 0.25) / kQuarterOfSteps;
-  const double most = frames > 0 ? quantile(sorted, kFree) + kDeviations * noise : 0;
+  // A quarter of the differences of two normal numbers are below 0.4506 deviations.
+  const double noise = steps.empty() ? 0 : quantile(steps, 0.25) / 0.4506;
+  const double most = frames > 0 ? quantile(sorted, 0.1) + 4 * noise : 0;
   std::vector<double> rests;
   for (const std::vector<float>& signal : signals) {
     std::vector<float> free;

@@ -35,7 +35,7 @@ inline void check_frame_decoder(std::span<const std::byte> input) {
   }
   for (const BoardFrame& frame : found) {
     for (const std::uint16_t sample : frame.samples) {
-      if (sample > kAdcMax) throw std::logic_error("frame decoder: a sample has more than 12 bits");
+      if (sample >= rig::kAdcCodes) throw std::logic_error("frame decoder: a sample has more than 12 bits");
     }
   }
 }

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 
+#include "data/frames/binary_decoder.h"
 #include "data/sensors/sensor.h"
 #include "io/numbers/numbers.h"
 
@@ -73,26 +74,9 @@ inline std::string sent_frame(const Sensor& sensor, std::span<const double> valu
       for (const std::size_t end = next + field.count; next < end; ++next)
         append_bytes(bytes, bits_of(values[next], f.type), width_of(f.type), f.big_endian);
   }
-  std::uint32_t sum = 0, crossed = 0, modbus = 0xFFFF, ccitt = 0xFFFF, crc8 = 0, crc32 = 0xFFFFFFFF;
-  for (const char c : std::string_view(bytes).substr(f.checksum_from.value_or(f.header.size()))) {
-    const auto byte = static_cast<unsigned char>(c);
-    sum += byte, crossed ^= byte, modbus ^= byte, ccitt ^= std::uint32_t{byte} << 8, crc8 ^= byte;
-    crc32 ^= byte;
-    for (int bit = 0; bit < 8; ++bit) {
-      modbus = modbus >> 1 ^ ((modbus & 1) != 0 ? 0xA001U : 0U);
-      ccitt = (ccitt << 1 ^ ((ccitt & 0x8000) != 0 ? 0x1021U : 0U)) & 0xFFFF;
-      crc8 = (crc8 << 1 ^ ((crc8 & 0x80) != 0 ? 0x07U : 0U)) & 0xFF;
-      crc32 = crc32 >> 1 ^ ((crc32 & 1) != 0 ? 0xEDB88320U : 0U);
-    }
-  }
-  const bool big = f.checksum_big_endian.value_or(f.big_endian);
-  if (f.checksum == "sum8") append_bytes(bytes, sum & 0xFF, 1, big);
-  if (f.checksum == "xor8") append_bytes(bytes, crossed, 1, big);
-  if (f.checksum == "sum16") append_bytes(bytes, sum & 0xFFFF, 2, big);
-  if (f.checksum == "crc8") append_bytes(bytes, crc8, 1, big);
-  if (f.checksum == "crc16-modbus") append_bytes(bytes, modbus, 2, big);
-  if (f.checksum == "crc16-ccitt") append_bytes(bytes, ccitt, 2, big);
-  if (f.checksum == "crc32") append_bytes(bytes, ~crc32, 4, big);
+  const auto covered = std::as_bytes(std::span(bytes)).subspan(f.checksum_from.value_or(f.header.size()));
+  append_bytes(bytes, checksum_of(f.checksum, covered), checksum_bytes(f.checksum),
+               f.checksum_big_endian.value_or(f.big_endian));
   return bytes + f.trailer;
 }
 

@@ -66,8 +66,8 @@ Layout layout_of(std::uint64_t seed, Family family) {
     f.header = dice.of<std::string>({"\xEB\x90", "$", "\x5A", "SUP", "\x10\x02"});
   const bool checked = f.header.empty() || dice.chance(0.4);
   if (checked) {
-    f.checksum =
-        dice.of<std::string>({"sum8", "xor8", "sum16", "crc8", "crc16-modbus", "crc16-ccitt", "crc32"});
+    f.checksum = dice.of<std::string>(
+        {"sum8", "xor8", "sum16", "crc8", "crc16-modbus", "crc16-ccitt", "crc16-xmodem", "crc32"});
     if (dice.chance(0.4)) f.checksum_from = 0;
     if (dice.chance(0.3)) f.checksum_big_endian = !f.big_endian;
   }
@@ -189,7 +189,7 @@ TEST(ProbeBinary, DraftsLayoutsRightOrNot) {
 /// What devices send besides: clocks of real seconds, and sums that no sensor's file can say (Fletcher's, a
 /// CRC that begins otherwise), which are no signals.
 std::uint16_t foreign_sum(std::string_view bytes, bool fletcher) {
-  std::uint32_t a = 0, b = 0, crc = 0;
+  std::uint32_t a = 0, b = 0, crc = 0x1D0F;
   for (const char c : bytes) {
     const auto byte = static_cast<unsigned char>(c);
     a = (a + byte) % 255, b = (b + a) % 255, crc ^= std::uint32_t{byte} << 8;
@@ -250,6 +250,44 @@ TEST(ProbeBinary, ForeignSumsAreNoSignals) {
       EXPECT_TRUE(!summed || outcome == Outcome::refused);
     }
   EXPECT_GE(right, 10);  // of 12 with a clock
+}
+
+std::string framed(const std::string& frame, const std::string& name) {
+  std::string sent = name == "COBS" ? "" : name == "SLIP" ? "\xC0" : "\x7E", block;
+  for (const char c : frame + std::string(1, '\0')) {
+    const bool slip = name == "SLIP" && (c == '\xC0' || c == '\xDB'),
+               hdlc = name == "HDLC" && (c == '\x7E' || c == '\x7D');
+    if (name == "COBS" && c == '\0')
+      sent += static_cast<char>(block.size() + 1) + block, block.clear();
+    else if (name == "COBS")
+      block += c;
+    else if (slip)
+      sent += c == '\xC0' ? "\xDB\xDC" : "\xDB\xDD";
+    else
+      sent += hdlc ? std::string{'\x7D', static_cast<char>(c ^ 0x20)} : std::string(1, c);
+  }
+  return sent + (name == "COBS" ? std::string(1, '\0') : sent.substr(0, 1));
+}
+
+TEST(ProbeBinary, FramingsAreRefusedByName) {
+  for (const std::string name : {"SLIP", "HDLC", "COBS", "seven"})
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+      Dice dice(seed, 5757);
+      Layout layout{.sensor = {}, .heard = {{100, ""}}, .says = {}};
+      std::vector<int> rest;
+      for (std::size_t k = 0; k < 16; ++k) rest.push_back(static_cast<int>(100 + dice.below(900)));
+      for (std::size_t n = 0; n < 250; ++n) {
+        std::string frame = name == "seven" ? "\xF0\x7D" : "\x02";
+        for (std::size_t k = 0; k < 16; ++k) {
+          const int v = rest[k] + (n / 25 % 16 == k ? 900 : 0) + static_cast<int>(3 * dice.normal());
+          const int low = name == "seven" ? 7 : 8;
+          frame += static_cast<char>(v >> low), frame += static_cast<char>(v & ((1 << low) - 1));
+        }
+        layout.heard[0].bytes += name == "seven" ? frame + "\xF7" : framed(frame, name);
+      }
+      EXPECT_EQ(outcome_of(layout), Outcome::refused) << layout.says;
+      EXPECT_NE(layout.says.find(name), std::string::npos) << layout.says;
+    }
 }
 
 TEST(ProbeBinary, PrintableValuesAreNoText) {

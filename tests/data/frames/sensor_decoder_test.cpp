@@ -163,6 +163,7 @@ TEST(SensorDecoder, ChecksumsAreThoseOfTheirStandards) {
   for (const auto& [kind, sum] : {std::pair("crc8", 0xF4U),
                                   {"crc16-modbus", 0x4B37U},
                                   {"crc16-ccitt", 0x29B1U},
+                                  {"crc16-xmodem", 0x31C3U},
                                   {"crc32", 0xCBF43926U},
                                   {"sum8", 0xDDU},
                                   {"sum16", 0x1DDU},

@@ -246,10 +246,82 @@ TextLayout third_layout_of(std::uint64_t seed) {
   return layout;
 }
 
+/// Exports and logs: names that tell channels and other quantities apart, decimal commas of several widths,
+/// thousands, hexadecimal bytes behind words, numbered taxels, a taxel a line, units and brackets that vary.
+constexpr std::size_t kForms = 12;
+Layout fourth_layout_of(std::uint64_t seed) {
+  Draws draw(seed + 4000);
+  const std::size_t form = seed % kForms, rows = 2 + draw.below(3), columns = 3 + draw.below(3);
+  const std::size_t values = form == 1 ? 3 * rows * columns : rows * columns;
+  constexpr const char* kWhat[] = {"names",     "channels",    "two hands",      "decimal commas",
+                                   "thousands", "hexadecimal", "numbered",       "a taxel a line",
+                                   "units",     "brackets",    "labelled movie", "Fortran"};
+  const std::string between = form == 3 || form == 4 ? ";" : draw.often(0.5) ? "," : "\t";
+  Layout layout;
+  layout.what = "fourth family, seed " + std::to_string(seed) + ", " + kWhat[form];
+  layout.values = values, layout.clock = form <= 3 || form == 6 || form == 7;
+  std::string names = "time";
+  for (std::size_t k = 0; k < values; ++k)
+    names += between + (form == 1   ? std::string(1, "xyz"[k % 3]) + std::to_string(k / 3)
+                        : form == 2 ? (2 * k < values ? "left" : "right") + std::to_string(k)
+                                    : "E" + std::to_string(k));
+  std::string all = form <= 2 ? names + (form == 0 ? between + "PDC" + between + "PAC" : "") + "\n" : "";
+  std::vector<double> rest;
+  for (std::size_t k = 0; k < values; ++k)
+    rest.push_back((form == 4 ? 1000 : form == 9 ? 0 : 300) + std::round(60 * draw.normal()));
+  const auto comma = [](std::string text) { return std::ranges::replace(text, '.', ','), text; };
+  for (int n = 0; n < 250; ++n) {
+    const double t = 1 + 0.02 * n;
+    std::vector<double> now;
+    std::string text = form == 3 ? comma(format(t, 2)) : layout.clock ? format(t, 2) : "";
+    if (form == 5) text = "can0 100 [" + std::to_string(values) + "]";
+    if (form == 6) text = "<f t=" + text + ">";
+    if (form == 10) text = "Frame " + std::to_string(n) + "\n";
+    for (std::size_t k = 0; k < values; ++k) {
+      double v = rest[k] + 3 * draw.normal() + (static_cast<std::size_t>(n / 20) % values == k ? 700 : 0);
+      if (form == 5) v = std::clamp(v / 4, 0.0, 255.0);
+      now.push_back(form == 3 || form == 11 ? std::round(10 * v) / 10 : std::round(v));
+      const std::string plain = format(now[k], 0), mark = text.empty() ? "" : between;
+      constexpr char kHex[] = "0123456789ABCDEF";
+      const int whole = static_cast<int>(now[k]);
+      if (form == 3)
+        text += mark + comma(format(now[k], 1));
+      else if (form == 4)
+        text += mark + (plain.size() > 3 ? plain.substr(0, plain.size() - 3) + " ,"[seed / kForms % 2] +
+                                               plain.substr(plain.size() - 3)
+                                         : plain);
+      else if (form == 5)
+        text += std::string(" ") + kHex[whole >> 4 & 15] + kHex[whole & 15];
+      else if (form == 6)
+        text += "<s i=\"" + std::to_string(k) + "\">" + plain + "</s>";
+      else if (form == 7)
+        all += text + between + std::to_string(k) + between + plain + "\n";
+      else if (form == 8)
+        text += (k > 0 ? " " : "") + (whole >= 1000 ? format(now[k] / 1000, 3) + "k" : plain);
+      else if (form == 9)
+        text += (k > 0 ? " " : "") + (whole < 0 ? "(" + format(-now[k], 0) + ")" : plain);
+      else if (form == 10)
+        text += plain + ((k + 1) % columns == 0 ? "\n" : between);
+      else if (form == 11)
+        text += (k > 0 ? " " : "") + format(now[k] / 1000, 4) + "D+03";
+      else
+        text += mark + plain;
+    }
+    if (form == 0)
+      text +=
+          between + std::to_string(2000 + draw.below(3)) + between + std::to_string(1900 + draw.below(90));
+    if (form != 7) all += text + "\n";
+    layout.sent.push_back(now), layout.time_s.push_back(t);
+  }
+  layout.heard = {{1, all}};
+  return layout;
+}
+
 /// Right: all frames that were sent but two, as they were sent and with their times where the lines say them;
 /// none besides. A frame with "nan" has the others' mean there.
 bool reads(const TextLayout& layout, const Sensor& draft) {
   if (draft.values() != layout.values || draft.frame.time.has_value() != layout.clock) return false;
+  if (layout.what.ends_with("channels") && draft.array.channels != 3) return false;
   const auto decoder = make_decoder(draft);
   std::size_t next = 0, right = 0, wrong = 0;
   std::optional<double> time_s;
@@ -300,6 +372,8 @@ void expect_right_or_refused(TextLayout (*layout_of_seed)(std::uint64_t), int co
 TEST(TextLayouts, AreDraftedRightOrRefused) { expect_right_or_refused(text_layout_of, 80, 0.85); }
 // Of the third only those with units can be right.
 TEST(TextLayouts, HabitsOfFirmwareAreNeverWrong) { expect_right_or_refused(third_layout_of, 40, 0.25); }
+// Of the fourth those with names, channels, commas, numbers of taxels, movies and Fortran's.
+TEST(TextLayouts, ExportsAreNeverWrong) { expect_right_or_refused(fourth_layout_of, 48, 0.45); }
 TEST(TextLayouts, OfObjectsAndSeveralArraysToo) { expect_right_or_refused(second_layout_of, 40, 0.85); }
 
 }  // namespace

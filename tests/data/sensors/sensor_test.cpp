@@ -138,8 +138,8 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
       {"frame", Json{{"kind", "binary"}, {"header", "A5"}, {"type", "u24"}},
        "\"frame.type\" must be u8, i8, u16, i16, u32, i32 or f32, found 'u24'"},
       {"frame", Json{{"kind", "binary"}, {"header", "A5"}, {"checksum", "md5"}},
-       "\"frame.checksum\" must be one of none, sum8, xor8, sum16, crc8, crc16-modbus, crc16-ccitt, crc32, "
-       "found 'md5'"},
+       "\"frame.checksum\" must be one of none, sum8, xor8, sum16, crc8, crc16-modbus, crc16-ccitt, "
+       "crc16-xmodem, crc32, found 'md5'"},
       {"frame", Json{{"kind", "binary"}, {"header", "A5"}, {"checksum", {{"kind", "crc8"}, {"from", 2}}}},
        "\"frame.checksum.from\" must be 0 to 1, within the header or right behind it, found 2"},
       {"frame", Json{{"kind", "binary"}, {"header", "A5"}, {"fields", {{{"values", 8}}, "time"}}},
