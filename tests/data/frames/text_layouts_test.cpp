@@ -249,7 +249,7 @@ TextLayout third_layout_of(std::uint64_t seed) {
 /// Exports and logs: names that tell channels and other quantities apart, decimal commas of several widths,
 /// thousands, hexadecimal bytes behind words, numbered taxels, a taxel a line, units and brackets that vary.
 constexpr std::size_t kForms = 12;
-Layout fourth_layout_of(std::uint64_t seed) {
+TextLayout fourth_layout_of(std::uint64_t seed) {
   Draws draw(seed + 4000);
   const std::size_t form = seed % kForms, rows = 2 + draw.below(3), columns = 3 + draw.below(3);
   const std::size_t values = form == 1 ? 3 * rows * columns : rows * columns;
@@ -257,7 +257,7 @@ Layout fourth_layout_of(std::uint64_t seed) {
                                    "thousands", "hexadecimal", "numbered",       "a taxel a line",
                                    "units",     "brackets",    "labelled movie", "Fortran"};
   const std::string between = form == 3 || form == 4 ? ";" : draw.often(0.5) ? "," : "\t";
-  Layout layout;
+  TextLayout layout;
   layout.what = "fourth family, seed " + std::to_string(seed) + ", " + kWhat[form];
   layout.values = values, layout.clock = form <= 3 || form == 6 || form == 7;
   std::string names = "time";
