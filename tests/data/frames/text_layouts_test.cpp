@@ -248,10 +248,9 @@ TextLayout third_layout_of(std::uint64_t seed) {
 
 /// Exports and logs: names that tell channels and other quantities apart, decimal commas of several widths,
 /// thousands, hexadecimal bytes behind words, numbered taxels, a taxel a line, units and brackets that vary.
-constexpr std::size_t kForms = 12;
 TextLayout fourth_layout_of(std::uint64_t seed) {
   Draws draw(seed + 4000);
-  const std::size_t form = seed % kForms, rows = 2 + draw.below(3), columns = 3 + draw.below(3);
+  const std::size_t form = seed % 12, rows = 2 + draw.below(3), columns = 3 + draw.below(3);
   const std::size_t values = form == 1 ? 3 * rows * columns : rows * columns;
   constexpr const char* kWhat[] = {"names",     "channels",    "two hands",      "decimal commas",
                                    "thousands", "hexadecimal", "numbered",       "a taxel a line",
@@ -287,7 +286,7 @@ TextLayout fourth_layout_of(std::uint64_t seed) {
       if (form == 3)
         text += mark + comma(format(now[k], 1));
       else if (form == 4)
-        text += mark + (plain.size() > 3 ? plain.substr(0, plain.size() - 3) + " ,"[seed / kForms % 2] +
+        text += mark + (plain.size() > 3 ? plain.substr(0, plain.size() - 3) + " ,"[seed / 12 % 2] +
                                                plain.substr(plain.size() - 3)
                                          : plain);
       else if (form == 5)
