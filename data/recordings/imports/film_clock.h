@@ -27,10 +27,10 @@ struct LoadCourse {
 /// so that saturation and outliers matter little. Every offset up to kFarthestS from the same beginning (or,
 /// where the clocks overlap already, from none) and every rate within kMostRate of 1 is tried on steps of 50
 /// ms; the best is refined by Gauss-Newton steps with the load's own slope, pixels of time weighted by a
-/// Huber norm of three deviations. The deviations take the residual's correlation in time into account.
-/// Throws std::runtime_error, saying why, where the courses do not agree: fewer than three touches or 5 s in
-/// common, correlation below 0.8, another place nearly as good, or a time that stays uncertain by more than 4
-/// ms or .04 %.
+/// Huber norm of three deviations. The deviations of shift and rate are a jackknife's over seconds of the
+/// film. Throws std::runtime_error, saying why, where the courses do not agree: fewer than three touches or 5
+/// s in common, correlation below 0.8, another place nearly as good, or a time that stays uncertain by more
+/// than 4 ms or .05 %.
 FilmClock find_film_clock(const LoadCourse& sensor, const LoadCourse& film);
 constexpr double kFarthestS = 5, kMostRate = 0.025;
 
