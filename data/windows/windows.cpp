@@ -396,8 +396,8 @@ float contact_level(std::span<const float> truth, std::size_t pixels) {
   for (const std::size_t f : quiet)
     for (const float v : truth.subspan(f * pixels, pixels)) values.push_back(double{v});
   const double rest = median(values);
-  const double level = rest + kSigmas * (quantile(values, 0.95) - rest) / kSigmasOf95;
-  return level <= kMost ? static_cast<float>(level) : 0;
+  const double noise = kSigmas * (quantile(values, 0.95) - rest) / kSigmasOf95;
+  return noise <= kMost ? static_cast<float>(rest + noise) : 0;
 }
 
 }  // namespace supertac

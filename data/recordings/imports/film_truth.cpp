@@ -13,7 +13,8 @@ namespace {
 std::vector<double> loads_of(const Recording& recording) {
   std::vector<double> loads(recording.frames());
   const std::size_t signals = recording.array.signals();
-  for (std::size_t i = 0; i < recording.signals.size(); ++i)
+  const auto axes = static_cast<std::size_t>(recording.array.channels);  // the last one is the load
+  for (std::size_t i = axes - 1; i < recording.signals.size(); i += axes)
     loads[i / signals] +=
         (recording.signal_scale.rest - double{recording.signals[i]}) / recording.signal_scale.span;
   return loads;
