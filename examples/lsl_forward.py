@@ -18,7 +18,7 @@ from pylsl import StreamInfo, StreamOutlet, local_clock  # noqa: E402
 outlet, offset, last = None, 0.0, 0.0
 for line in sys.stdin:
     seen = json.loads(line)
-    values = seen.get("picture", seen["volts"])
+    values = seen.get("picture") or seen.get("volts") or seen["signals"]
     if outlet is None:
         info = StreamInfo("SuperTac", "tactile", len(values), 0, "float32", "supertac-stream")
         drawn = "picture, rows from the smallest y" if "picture" in seen else "array, row by row, in " + seen["unit"]

@@ -25,7 +25,8 @@ def main():
     taxels = node.create_publisher(Float32MultiArray, "/supertac/taxels", 10)
     for line in sys.stdin:
         seen = json.loads(line)
-        felt, stride = Float32MultiArray(data=seen["volts"]), len(seen["volts"])
+        signals = seen.get("volts") or seen["signals"]
+        felt, stride = Float32MultiArray(data=signals), len(signals)
         for label in ("rows", "columns", "channels"):
             felt.layout.dim.append(MultiArrayDimension(label=label, size=seen[label], stride=stride))
             stride //= seen[label]

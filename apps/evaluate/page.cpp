@@ -219,6 +219,7 @@ std::string EvaluationPage::by_group(const nlohmann::ordered_json& groups) const
 std::string EvaluationPage::shown(const std::string& title, const std::string& note,
                                   const std::vector<ScoredWindow>& chosen,
                                   const std::map<std::uint32_t, ShownWindow>& pictures) const {
+  if (chosen.empty()) return "";
   const TaxelArray array = windows_.array();
   const ImageGrid grid = windows_.image();
   std::string cards = "<div class=\"windows\">";
@@ -297,9 +298,7 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
                         std::to_string(result["contact"]["windows"].get<long>()) + " in contact</p>";
   content += by_method(result) + "<div class=\"two\">" + by_group(result["groups"]) + by_zone(result) +
              "</div>" + by_height(result["trust"]) + by_distance(result["felt"]) + by_element(result) +
-             (of_groups.empty() ? ""
-                                : shown("The worst of each", "the groups in the order of their scores",
-                                        of_groups, pictures)) +
+             shown("The worst of each", "the groups in the order of their scores", of_groups, pictures) +
              shown("The worst windows", "in contact, by SSIM; no two within 3 mm of one pass, or 20 frames",
                    worst, pictures) +
              shown("The best windows", "of those with something on a quarter of the picture", best, pictures);

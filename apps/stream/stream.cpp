@@ -269,8 +269,9 @@ void Stream::output(const LiveFrame& seen) {
   if (log_) log_->add(seen);
   if (mcap_) mcap_->add(seen.time_s, seen.wall_s, seen.signals, seen.picture, seen.half_widths);
   if (!pipe_) return;
-  const FrameLoad load = load_of(seen.signals, source_.array().channels, source_.signal_scale());
-  pipe_->send(picture_line(seen, load, state_.unlike_training, about_lines_));
+  const SignalScale scale = source_.signal_scale();
+  const FrameLoad load = load_of(seen.signals, source_.array().channels, scale);
+  pipe_->send(picture_line(seen, load, scale, state_.unlike_training, about_lines_));
 }
 
 void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {

@@ -11,7 +11,7 @@
 #include <stdexcept>
 
 #include "apps/common/running/signals.h"
-#include "data/sensors/sensor.h"
+#include "data/recordings/signals_tensor.h"
 #include "hardware/ports/serial_port.h"
 #include "io/numbers/numbers.h"
 
@@ -37,14 +37,14 @@ void append(std::string& line, const char* name, std::span<const float> values) 
 
 }  // namespace
 
-std::string picture_line(const LiveFrame& seen, const FrameLoad& load, bool unlike_training,
-                         const std::string& about) {
+std::string picture_line(const LiveFrame& seen, const FrameLoad& load, const SignalScale& scale,
+                         bool unlike_training, const std::string& about) {
   std::string line = "{\"timestamp\":" + format(seen.time_s, 6);
   if (!std::isnan(seen.wall_s)) line += ",\"wall_s\":" + format(seen.wall_s, 6);
   line += ",\"number\":" + std::to_string(seen.number) + "," + about + ",\"total_force\":";
   append(line, load.total_force, 4);
   line += ",\"saturated\":" + std::to_string(load.saturated);
-  append(line, "volts", seen.signals);
+  append(line, signals_tensor(scale), seen.signals);
   if (!seen.picture.empty()) append(line, "picture", seen.picture);
   if (!seen.half_widths.empty()) {
     line += ",\"half_width\":";

@@ -15,9 +15,10 @@ namespace supertac {
 /// {"timestamp":s,"wall_s":s,"number":n,ABOUT,"total_force":f,"saturated":n,"volts":[...],"picture":[...]}
 /// with the numbers of LiveFrame and its load, four decimals of what is felt and drawn, and a line feed;
 /// without a model no "picture"; of one that says how sure it is also "half_width", the mean over the pixels,
-/// "distance" and "unlike_training", 0 or 1. "wall_s" only where it is known.
-std::string picture_line(const LiveFrame& seen, const FrameLoad& load, bool unlike_training,
-                         const std::string& about);
+/// "distance" and "unlike_training", 0 or 1. "wall_s" only where it is known. "volts" are "signals" of any
+/// other unit (signals_tensor()).
+std::string picture_line(const LiveFrame& seen, const FrameLoad& load, const SignalScale& scale,
+                         bool unlike_training, const std::string& about);
 /// What all lines of a stream have in common:
 /// "height":16,"width":16,"pixel_mm":0.75,"rows":4,"columns":4,"channels":1,"pitch_mm":3,"unit":"V".
 std::string about_lines(const TaxelArray& array, const std::string& unit, const ImageGrid& image);

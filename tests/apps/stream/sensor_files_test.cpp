@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "data/recordings/recording.h"
+#include "data/recordings/signals_tensor.h"
 #include "data/recordings/simulator.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
@@ -200,7 +201,7 @@ TEST_P(SensorFile, IsProbedViewedRecordedAndReadBack) {
     expect_sent(recording, device, arranged);
     // What a reader of lines sees is what is recorded.
     const std::string line = streamed.out.substr(0, streamed.out.find('\n'));
-    EXPECT_EQ(parse_json_limited(line).at("volts").size(), described.array.signals());
+    EXPECT_EQ(parse_json_limited(line).at(signals_tensor(described.scale)).size(), described.array.signals());
     EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(streamed.out, '\n')), recording.frames());
   }
 }

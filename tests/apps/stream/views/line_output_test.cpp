@@ -31,11 +31,11 @@ LiveFrame seen(std::uint64_t number) {
 TEST(PictureLine, HoldsWhatIsKnownAndNothingElse) {
   LiveFrame one = seen(3);
   const std::string about = about_lines({.rows = 2, .columns = 8, .pitch_mm = 5}, "N", {8, 32, 1.25});
-  const std::string line = picture_line(one, {2.5, 3}, false, about);
+  const std::string line = picture_line(one, {2.5, 3}, {.unit = "N"}, false, about);
   EXPECT_TRUE(line.ends_with("}\n"));
   auto json = parse_json_limited(line);
   EXPECT_NEAR(json["timestamp"].get<double>(), 3.0 / 1008, 1e-6);
-  EXPECT_EQ(json["volts"].get<std::vector<float>>(), kVolts);
+  EXPECT_EQ(json["signals"].get<std::vector<float>>(), kVolts);
   EXPECT_EQ(json["picture"].get<std::vector<float>>(), kPicture);
   EXPECT_EQ(json["height"], 8);
   EXPECT_EQ(json["width"], 32);
@@ -49,14 +49,14 @@ TEST(PictureLine, HoldsWhatIsKnownAndNothingElse) {
   EXPECT_EQ(json["saturated"], 3);
   EXPECT_EQ(json.size(), 14U);
   one.half_widths = kHalf, one.distance = 1.5, one.wall_s = 1.7e9;
-  json = parse_json_limited(picture_line(one, {}, true, about));
+  json = parse_json_limited(picture_line(one, {}, {}, true, about));
   EXPECT_EQ(json["wall_s"], 1.7e9);
   EXPECT_EQ(json["half_width"], 0.25);
   EXPECT_EQ(json["distance"], 1.5);
   EXPECT_EQ(json["unlike_training"], 1);
   const std::vector<float> strange(16, std::nanf(""));
   one.signals = strange;
-  EXPECT_TRUE(parse_json_limited(picture_line(one, {}, true, about))["volts"][0].is_null());
+  EXPECT_TRUE(parse_json_limited(picture_line(one, {}, {}, true, about))["volts"][0].is_null());
 }
 
 class Pipe : public testing::Test {
@@ -76,7 +76,7 @@ TEST_F(Pipe, WhoDoesNotReadLosesLinesAndHoldsUpNobody) {
   const auto begin = std::chrono::steady_clock::now();
   {
     PipeOutput output(ends_[1], false);
-    for (std::uint64_t i = 0; i < 5000; ++i) output.send(picture_line(seen(i), {}, false, kAbout));
+    for (std::uint64_t i = 0; i < 5000; ++i) output.send(picture_line(seen(i), {}, {}, false, kAbout));
     EXPECT_GT(output.lost(), 500U);
   }
   EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 200);
