@@ -16,11 +16,9 @@ bool is_unknown_plate(const std::string& name) { return name.starts_with("unknow
 Plate plate_in_folder(const std::string& name, const std::string& folder) {
   if (is_unknown_plate(name))
     throw std::invalid_argument(
-        "plate " + in_quotes(name) +
-        ": these signals have no truth to train on or score. Learn from simulated presses (supertac-simulate "
+        "these signals have no truth to train on or score. Learn from simulated presses (supertac-simulate "
         "--sensor FILE --presses N), film what presses (supertac-import --truth), or slide over a plate that "
-        "is "
-        "known (supertac-import --plate NAME)");
+        "is known (supertac-import --plate NAME)");
   if (!Plate::is_file(name)) return Plate::named(name);
   if (name.find('/') != std::string::npos)
     throw std::invalid_argument("plate " + in_quotes(name) +

@@ -123,7 +123,7 @@ TEST(TextFolder, APlateOfUnknownShapeIsImportedWithoutPositions) {
   WindowSet windows((WindowSettings()));
   EXPECT_EQ(
       what_of<std::invalid_argument>([&] { windows.add(recording); }),
-      "plate 'unknown_felt': these signals have no truth to train on or score. Learn from simulated presses "
+      "these signals have no truth to train on or score. Learn from simulated presses "
       "(supertac-simulate --sensor FILE --presses N), film what presses (supertac-import --truth), or slide "
       "over a plate that is known (supertac-import --plate NAME)");
 }
