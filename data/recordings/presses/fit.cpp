@@ -28,6 +28,7 @@ struct Form {
   double least, most;
   void (*set)(Body&, double form, double pitch_mm);
   double (*value)(double form, double pitch_mm);
+  bool may_be_none = false;  // not every array has it: what cannot be told is left out
 };
 double exp_of(double form) { return same_bits::exp(form); }
 constexpr double kLogFifth = -1.6094, kLogThreeHalves = 0.4055, kLogHundredth = -4.6052, kLogTen = 2.3026;
@@ -38,15 +39,15 @@ const Form kForms[] = {
     {"knee", 0.001, 0.85, [](Body& b, double f, double) { b.knee = (1 - f) / f; },
      [](double f, double) { return (1 - std::clamp(f, 0.001, 0.95)) / std::clamp(f, 0.001, 0.95); }},
     {"crosstalk_rows", 0, 0.5, [](Body& b, double f, double) { b.crosstalk_rows = f; },
-     [](double f, double) { return std::max(0.0, f); }},
+     [](double f, double) { return std::max(0.0, f); }, true},
     {"crosstalk_columns", 0, 0.5, [](Body& b, double f, double) { b.crosstalk_columns = f; },
-     [](double f, double) { return std::max(0.0, f); }},
+     [](double f, double) { return std::max(0.0, f); }, true},
     {"hysteresis_s", kLogHundredth, 0, [](Body& b, double f, double) { b.hysteresis_s = exp_of(f); },
      [](double f, double) { return exp_of(f); }},
     {"creep", 0.001, 0.4, [](Body& b, double f, double) { b.creep = f; },
-     [](double f, double) { return std::max(0.001, f); }},
+     [](double f, double) { return std::max(0.001, f); }, true},
     {"creep_s", -0.6931, kLogTen, [](Body& b, double f, double) { b.creep_s = exp_of(f); },
-     [](double f, double) { return exp_of(f); }}};
+     [](double f, double) { return exp_of(f); }, true}};
 constexpr std::size_t kNumbers = std::size(kForms);
 
 // A number that the file states without an uncertainty is known, and is not looked for.
@@ -277,7 +278,7 @@ BodyFit BodyFitter::operator()(const Recording& touches) const {
   creep.told = creep_s.told = creep.told && creep_s.told;
   for (std::size_t k = 0; k < kNumbers; ++k) {
     const FittedNumber& number = fit.numbers[k];
-    if (known(sensor_.body, number.key)) continue;
+    if (known(sensor_.body, number.key) || (kForms[k].may_be_none && !number.told)) continue;
     kForms[k].set(fit.sensor.body, std::clamp(predicted[k], kForms[k].least, kForms[k].most), pitch);
     fit.sensor.body.uncertainty[number.key] = number.deviation;
   }
