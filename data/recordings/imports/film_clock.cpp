@@ -132,7 +132,6 @@ Vector solved(Matrix a, Vector y) {
 }
 
 Refined refine(const Even& sensor, const Even& film, double middle_s, const Place& from) {
-  constexpr double kTogetherS = 1;  // residuals of a touch go together
   Vector unknown = {from.offset_s, from.rate, 1, 0, 0};
   Matrix normal;
   struct Second {  // sums of weight residual jacobian, and of weight jacobian jacobian
@@ -146,8 +145,7 @@ Refined refine(const Even& sensor, const Even& film, double middle_s, const Plac
   for (int round = 0; round < 12; ++round) {
     normal = {};
     Vector right{};
-    seconds.assign(
-        static_cast<std::size_t>(film.step_s * static_cast<double>(film.load.size()) / kTogetherS) + 1, {});
+    seconds.assign(static_cast<std::size_t>(film.step_s * static_cast<double>(film.load.size())) + 1, {});
     sizes.clear(), sums = {};
     for (std::size_t i = 0; i < film.load.size(); ++i) {
       const double away = film.time(i) - middle_s, t = middle_s + unknown[kShift] + unknown[kRate] * away;
@@ -158,7 +156,7 @@ Refined refine(const Even& sensor, const Even& film, double middle_s, const Plac
       const double slope = (unknown[kGain] + 2 * load * unknown[kBent]) * sensor.slope(t);
       const Vector jacobian = {slope, slope * away, load, load * load, 1};
       const double weight = std::min(1.0, 3 * deviation / std::max(1e-12, std::abs(residual)));
-      Second& second = seconds[static_cast<std::size_t>((film.time(i) - film.first_s) / kTogetherS)];
+      Second& second = seconds[static_cast<std::size_t>(film.time(i) - film.first_s)];
       for (std::size_t a = 0; a < kUnknowns; ++a) {
         second.score[a] += weight * jacobian[a] * residual, right[a] += weight * jacobian[a] * residual;
         for (std::size_t b = 0; b < kUnknowns; ++b) {
@@ -220,7 +218,7 @@ FilmClock find_film_clock(const LoadCourse& sensor, const LoadCourse& film) {
   if (!(fine.correlation >= 0.8))
     refuse("their total loads have a correlation of " + format(fine.correlation, 2) +
            ", expected 0.8 or more");
-  if (!(fine.shift_deviation_s <= 0.004 && fine.rate_deviation <= 5e-4))
+  if (!(fine.shift_deviation_s <= 0.004 && fine.rate_deviation <= 4e-4))
     refuse("the offset stays uncertain by " + format(fine.shift_deviation_s, 3) + " s, the rate by " +
            format(100 * fine.rate_deviation, 3) + " %");
   if (std::abs(fine.rate - 1) > kMostRate) refuse("a rate of " + format(fine.rate, 4));

