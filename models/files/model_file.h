@@ -21,7 +21,7 @@ namespace supertac {
 /// How a sensor's signals become the input of SuperTac.
 struct InputSettings {
   double rate_hz = 300;
-  Scaling scaling;
+  Scaling scaling = {};
   /// Length of the moving average (s) that the training signals went through, 0 = none; empty when they
   /// differed.
   std::optional<double> filter_s = 0.0;

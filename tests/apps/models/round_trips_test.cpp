@@ -30,12 +30,12 @@ class RoundTrips : public Training {
     std::ranges::sort(tensors, {}, [&](const TensorToWrite& t) { return file.tensors().at(t.name).begin; });
     write_safetensors(to, file.metadata(), tensors);
     fs::remove(to + ".typed");
-    if (!write_typed(from, file, to + ".typed")) return;
+    if (!write_typed(file, to + ".typed")) return;
     EXPECT_EQ(read_text_file(to + ".typed", kPlenty), read_text_file(from, kPlenty)) << from;
   }
 
   // What a library's reader makes of it, by the library's writer.
-  static bool write_typed(const std::string& from, const SafetensorsFile& file, const std::string& to) {
+  static bool write_typed(const SafetensorsFile& file, const std::string& to) {
     const auto said = [&](const char* key) {
       return file.metadata().contains(key) ? file.metadata().at(key) : std::string();
     };
