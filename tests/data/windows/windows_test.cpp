@@ -155,6 +155,14 @@ TEST(Windows, InTheAirTheTruthIsFlat) {
   EXPECT_FALSE(in_contact(truth));
 }
 
+TEST(Windows, AFlaggedReliablePassIsKept) {
+  Recording recording = make_recording({});
+  recording.metadata["registration_reliable"] = "yes";
+  WindowSet set(wide_settings(16));
+  set.add(recording);
+  EXPECT_EQ(set.size(), 85U);
+}
+
 TEST(Windows, OfAnyArray) {
   SimulatorSettings settings;
   settings.array = {.rows = 6, .columns = 6, .pitch_mm = 2};
@@ -267,16 +275,20 @@ TEST(Windows, FingerprintTellsDataApart) {
   EXPECT_EQ(a.fingerprint().size(), 16U);
 }
 
-// What a finer sensor saw: frame i is i / 1000 in its first pixel, 0.5 elsewhere.
+// What a finer sensor saw: frame i is i / 1000 in its first pixel, 0.5 in its last quarter, 0 elsewhere.
 Recording with_truth(std::size_t frames, const TaxelArray& array) {
   Recording recording = make_recording({.plate = "a sponge", .frames = frames});
   recording.array = array;
   recording.signals.resize(frames * array.signals());
   recording.position_mm.clear();
   recording.truth_height = 4 * array.rows, recording.truth_width = 4 * array.columns;
-  recording.truth.assign(frames * array.picture(4).pixels(), 0.5F);
-  for (std::size_t i = 0; i < frames; ++i)
-    recording.truth[i * array.picture(4).pixels()] = static_cast<float>(i) / 1000;
+  const std::size_t pixels = array.picture(4).pixels();
+  recording.truth.assign(frames * pixels, 0);
+  for (std::size_t i = 0; i < frames; ++i) {
+    const auto frame = recording.truth.begin() + static_cast<std::ptrdiff_t>(i * pixels);
+    std::fill_n(frame + static_cast<std::ptrdiff_t>(pixels - pixels / 4), pixels / 4, 0.5F);
+    *frame = static_cast<float>(i) / 1000;
+  }
   return recording;
 }
 
