@@ -1,6 +1,5 @@
 # -DSUPERTAC_QUICK_BUILD=ON, as scripts/demo.sh and scripts/test.sh have it: headers of the standard library, JSON and
-# GoogleTest are parsed once for all files, and some files of a target are compiled as one. Off by default, since a file
-# that forgets an #include would compile with it.
+# GoogleTest are parsed once for all files. Off by default, since a file that forgets an #include would compile with it.
 if(NOT SUPERTAC_QUICK_BUILD)
   return()
 endif()
@@ -18,7 +17,7 @@ file(WRITE ${PROJECT_BINARY_DIR}/precompiled.cpp "int main() {}\n")
 # Files for one instruction set have flags with which a header compiled without them is of no use, and names in common.
 file(GLOB_RECURSE own_flags ${PROJECT_SOURCE_DIR}/autograd/kernels/fast/*.cpp)
 set_source_files_properties(${own_flags} TARGET_DIRECTORY supertac_autograd supertac_autograd_f64
-  PROPERTIES SKIP_PRECOMPILE_HEADERS ON SKIP_UNITY_BUILD_INCLUSION ON)
+  PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
 
 # A library (-fPIC) and a program (-fPIE) cannot share a header, nor can files with OpenMP and without, nor examples, which
 # have none of our options.
@@ -29,10 +28,6 @@ function(supertac_precompile target)
     return()
   endif()
   get_target_property(folder ${target} SOURCE_DIR)
-  # Not ports: they include termbits.h of Linux, which bears no termios.h beside it.
-  if(type STREQUAL "STATIC_LIBRARY" AND NOT folder MATCHES "/(hardware|tests)")
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
-  endif()
   set(kind plain)
   if(libraries MATCHES "GTest" AND folder MATCHES "/(apps|failures|models)")
     set(kind test_json)
