@@ -25,7 +25,8 @@ WebSite WebView::site() {
                            {"stop", [this] { return recorder_.stop(); }}},
                .file = [this](const std::string& name) { return recorder_.file(name); }};
   if (order_ == nullptr) return site;
-  site.actions["order"] = [this] { return order_->start(); };
+  // Begun or left as it is here: the page's newest event may be older than its last answer.
+  site.actions["order"] = [this] { return order_->status().asked ? order_->leave() : order_->start(); };
   site.actions["skip"] = [this] { return order_->skip(); };
   site.actions["leave"] = [this] { return order_->leave(); };
   return site;

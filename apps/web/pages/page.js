@@ -300,7 +300,7 @@ const actions = {
   pause, snapshot,
   record: () => ask(element("record").getAttribute("aria-pressed") === "true" ? "stop" : "record"),
   rezero: () => ask("rezero"),
-  order: () => ask(supertac.newest && supertac.newest.asked !== undefined ? "leave" : "order", "ask"),
+  order: () => ask("order", "ask"),
   skip: () => ask("skip", "ask"),
 };
 for (const id of Object.keys(actions)) element(id).addEventListener("click", actions[id]);
