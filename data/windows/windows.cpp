@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
-#include <numeric>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -11,6 +10,7 @@
 #include "data/plates/height_map.h"
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
+#include "data/windows/contact_level.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/median.h"
@@ -378,26 +378,6 @@ std::string WindowSet::fingerprint() const {
                (rows_[r].last + (i - rows_[r].first_window) * rows_[r].stride));
   }
   return hash.hex();
-}
-
-float contact_level(std::span<const float> truth, std::size_t pixels) {
-  constexpr double kSigmas = 6, kMost = 0.1, kSigmasOf95 = 1.645;
-  constexpr std::size_t kShare = 10, kLeastFrames = 3, kMostFrames = 200;
-  const std::size_t frames = truth.size() / pixels;
-  std::vector<double> sums(frames);
-  for (std::size_t f = 0; f < frames; ++f)
-    for (const float v : truth.subspan(f * pixels, pixels)) sums[f] += double{v};
-  std::vector<std::size_t> quiet(frames);
-  std::iota(quiet.begin(), quiet.end(), std::size_t{0});
-  std::ranges::stable_sort(quiet, {}, [&](std::size_t f) { return sums[f]; });
-  quiet.resize(std::min(frames / kShare, kMostFrames));
-  if (quiet.size() < kLeastFrames) return 0;
-  std::vector<double> values;
-  for (const std::size_t f : quiet)
-    for (const float v : truth.subspan(f * pixels, pixels)) values.push_back(double{v});
-  const double rest = median(values);
-  const double noise = kSigmas * (quantile(values, 0.95) - rest) / kSigmasOf95;
-  return noise <= kMost ? static_cast<float>(rest + noise) : 0;
 }
 
 }  // namespace supertac

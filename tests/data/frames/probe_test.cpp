@@ -379,11 +379,9 @@ TEST(FindGain, IsLimitedAndSaysWhenNothingWasPressed) {
 }
 
 TEST(Probe, OfAnythingEndsAndHasADraftThatReads) {
-  std::uint64_t state = 9;
-  const auto random = [&](std::uint64_t below) {
-    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
-    return (state >> 33) % below;
-  };
+  const RandomStream stream(9, 0);
+  std::uint64_t at = 0;
+  const auto random = [&](std::uint64_t below) { return stream.bits(at++) % below; };
   const Sensor mat =
       sensor_of(R"({"rows":4,"columns":4,"pressed":"higher","range":[0,900],"frame":{"kind":"text"}})");
   for (int run = 0; run < 60; ++run) {

@@ -1,4 +1,4 @@
-#include "data/windows/windows.h"
+#include "data/windows/contact_level.h"
 
 #include <gtest/gtest.h>
 
