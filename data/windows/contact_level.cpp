@@ -13,8 +13,7 @@ float contact_level(std::span<const float> truth, std::size_t pixels) {
   constexpr std::size_t kShare = 10, kLeastFrames = 3, kMostFrames = 200;
   const std::size_t frames = truth.size() / pixels;
   std::vector<double> sums(frames);
-  for (std::size_t f = 0; f < frames; ++f)
-    for (const float v : truth.subspan(f * pixels, pixels)) sums[f] += double{v};
+  for (std::size_t i = 0; i < frames * pixels; ++i) sums[i / pixels] += double{truth[i]};
   std::vector<std::size_t> quiet(frames);
   std::iota(quiet.begin(), quiet.end(), std::size_t{0});
   std::ranges::stable_sort(quiet, {}, [&](std::size_t f) { return sums[f]; });

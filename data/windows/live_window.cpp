@@ -10,7 +10,7 @@
 namespace supertac {
 namespace {
 
-void check(const LiveWindowSettings& s) {
+LiveWindowSettings checked(LiveWindowSettings s) {
   const auto fail = [](const std::string& what) { throw std::invalid_argument("live window: " + what); };
   if (s.signals < 1) fail("a frame must have at least 1 signal");
   if (s.timesteps < 1) fail("timesteps must be at least 1, got " + std::to_string(s.timesteps));
@@ -19,10 +19,6 @@ void check(const LiveWindowSettings& s) {
          std::to_string(s.rate_hz) + ", " + std::to_string(s.frame_period_s) + ", " +
          std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span));
   if (!(s.filter_s >= 0)) fail("filter_s must not be negative, got " + std::to_string(s.filter_s));
-}
-
-LiveWindowSettings checked(LiveWindowSettings s) {
-  check(s);
   s.max_gap_s = std::max(s.max_gap_s, kGapPeriods * s.frame_period_s);
   return s;
 }

@@ -32,9 +32,8 @@ struct LiveWindowSettings {
 class LiveWindow {
  public:
   struct Counters {
-    std::size_t frames = 0;  ///< taken
-    std::size_t gaps =
-        0;  ///< silences longer than max_gap_s, or steps of the time back by more: all starts anew
+    std::size_t frames = 0;   ///< taken
+    std::size_t gaps = 0;     ///< silences, or steps back, longer than max_gap_s: all starts anew
     std::size_t damaged = 0;  ///< a voltage or the time is not finite: taken as lost
     std::size_t late = 0;     ///< not later than the frame before: left out
   };
