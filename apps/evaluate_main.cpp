@@ -218,9 +218,7 @@ void declare(Arguments& a) {
   a.option("pictures", "DIR",
            "write PNG pictures: input | output | truth | how far off it may be, and a film of each test pass")
       .writes();
-  a.option("report", "FILE",
-           "write one page with scores, the best and worst windows and a film of each test pass (HTML)")
-      .writes();
+  a.option("report", "FILE", "write one page with scores and the best and worst windows (HTML)").writes();
 }
 
 int run(Arguments& a) {
@@ -261,8 +259,7 @@ int run(Arguments& a) {
     if (!kinds.empty()) std::ranges::for_each(maps, [&](NamedMap& map) { draw_as(map, kinds); });
     write_maps(a.output("map"), maps);
   }
-  if (a.given("report"))
-    write_file(a.output("report"), page.html(network, tested.split.test, result, made_by(a, windows)));
+  if (a.given("report")) write_file(a.output("report"), page.html(network, result, made_by(a, windows)));
   if (pictures) pictures->keep();
   a.write_json(result);
   return kExitOk;

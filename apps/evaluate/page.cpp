@@ -5,10 +5,7 @@
 #include <utility>
 
 #include "apps/evaluate/score_tables.h"
-#include "apps/web/chart.h"
-#include "apps/web/encode.h"
 #include "apps/web/result_page.h"
-#include "data/windows/split.h"
 #include "io/images/images.h"
 #include "io/numbers/numbers.h"
 
@@ -34,22 +31,6 @@ std::string method_row(const std::string& name, const nlohmann::ordered_json& sc
          cell_of(all["psnr_mean_db"], 2) + cell_of(latency["median_us"], 1) + "</tr>";
 }
 
-std::string against_time(const nlohmann::ordered_json& result) {
-  ChartSeries network{.name = "network", .points = {}, .line = false, .dots = true},
-      baselines{.name = "baselines", .points = {}, .line = false, .dots = true};
-  const auto add = [&](ChartSeries& series, const std::string& name, const nlohmann::ordered_json& scores) {
-    const auto& us = result["latency"][name]["median_us"];
-    const auto& ssim = scores["contact"]["ssim"];
-    if (!us.is_number() || !ssim.is_number()) return;
-    series.points.emplace_back(us.get<double>(), ssim.get<double>());
-    series.labels.push_back(name);
-  };
-  add(network, "network", result);
-  for (const auto& [name, scores] : result["baselines"].items()) add(baselines, name, scores);
-  return chart_svg("Contact SSIM", {.label = "one picture, us", .logarithmic = true},
-                   {.label = "SSIM", .most = 1}, {network, baselines});
-}
-
 std::string by_method(const nlohmann::ordered_json& result) {
   std::string rows = method_row("network", result, result["latency"]["network"]);
   for (const auto& [name, scores] : result["baselines"].items())
@@ -59,9 +40,7 @@ std::string by_method(const nlohmann::ordered_json& result) {
                                                        : "contact windows: some texture lies under the array",
                       page_table({"method", "contact SSIM", "PSNR dB", "position mm", "all SSIM", "PSNR dB",
                                   "one picture, us"},
-                                 rows)) +
-         page_section("Accuracy against the time of a picture", "processor time of one picture on one thread",
-                      against_time(result));
+                                 rows));
 }
 
 std::string by_zone(const nlohmann::ordered_json& result) {
@@ -118,16 +97,14 @@ std::string by_element(const nlohmann::ordered_json& result) {
 
 std::string by_distance(const nlohmann::ordered_json& parts) {
   if (parts.empty()) return "";  // nothing slid
-  ChartSeries series{.name = "network", .points = {}, .dots = true};
-  for (const auto& part : parts) {
-    series.points.emplace_back(part["from_mm"].get<double>(), part["ssim"].get<double>());
-    series.labels.push_back(std::to_string(part["windows"].get<long>()) + " windows");
-  }
+  std::string rows;
+  for (const auto& part : parts)
+    rows += "<tr><td>" + format(part["from_mm"].get<double>()) + "</td>" + cell_of(part["windows"], 0) +
+            cell_of(part["ssim"], 3) + cell_of(part["psnr_mean_db"], 2) + "</tr>";
   return page_section(
       "By distance since the first contact",
       "a texture cannot be known before its second element is under the array; contact windows",
-      chart_svg("Contact SSIM", {.label = "slid over the texture, mm", .least = 0},
-                {.label = "SSIM", .most = 1}, {series}));
+      page_table({"slid from, mm", "windows", "SSIM", "PSNR dB"}, rows));
 }
 
 std::string png_of(std::span<const float> values, int rows, int columns) {
@@ -135,20 +112,6 @@ std::string png_of(std::span<const float> values, int rows, int columns) {
   Picture picture(kPanel * columns / longer, kPanel * rows / longer);
   draw_panel(picture, {0, 0, picture.width, picture.height}, values, rows, columns);
   return picture_address(picture);
-}
-
-const char* word_of(Zone zone, bool measured) {
-  switch (zone) {
-    case Zone::contact:
-      return "in contact";
-    case Zone::near:
-      return measured ? "beside contact" : "near texture";
-    case Zone::flat:
-      return measured ? "at rest" : "flat plate";
-    case Zone::air:
-      return "in the air";
-  }
-  return "";
 }
 
 }  // namespace
@@ -180,19 +143,6 @@ std::vector<EvaluationPage::ScoredWindow> EvaluationPage::extremes(bool best, co
       chosen.push_back(one);
   }
   return chosen;
-}
-
-std::vector<std::uint32_t> EvaluationPage::film_frames(std::span<const std::uint32_t> test) const {
-  std::map<std::size_t, std::vector<std::uint32_t>> of_pass;
-  for (const std::uint32_t window : test) of_pass[windows_.pass_of(window)].push_back(window);
-  std::vector<std::uint32_t> frames;
-  const std::size_t most =
-      std::clamp<std::size_t>(kFilmFrames / std::max<std::size_t>(1, of_pass.size()), 1, kFramesOfPass);
-  for (const auto& [pass, all] : of_pass) {
-    const std::vector<std::uint32_t> some = evenly_spaced(all, most);
-    frames.insert(frames.end(), some.begin(), some.end());
-  }
-  return frames;
 }
 
 std::string EvaluationPage::name_of(std::uint32_t window) const {
@@ -243,38 +193,7 @@ std::string EvaluationPage::shown(const std::string& title, const std::string& n
   return page_section(title, note, cards + "</div>");
 }
 
-std::string EvaluationPage::films(std::span<const std::uint32_t> frames,
-                                  const std::map<std::uint32_t, ShownWindow>& pictures) const {
-  const ImageGrid grid = windows_.image();
-  nlohmann::json passes = nlohmann::json::array();
-  std::size_t pass = SIZE_MAX;
-  for (const std::uint32_t window : frames) {
-    if (windows_.pass_of(window) != pass) {
-      pass = windows_.pass_of(window);
-      passes.push_back({{"name", name_of(window)}, {"frames", nlohmann::json::array()}});
-    }
-    const ShownWindow& p = pictures.at(window);
-    std::vector<float> all = p.input;
-    all.insert(all.end(), p.drawn.begin(), p.drawn.end());
-    all.insert(all.end(), p.truth.begin(), p.truth.end());
-    passes.back()["frames"].push_back(
-        {{"place", windows_.place_text(window)},
-         {"zone", word_of(windows_.zone(window), windows_.truth_is_measured(windows_.pass_of(window)))},
-         {"ssim", ssim(p.drawn, p.truth, grid.height, grid.width)},
-         {"levels", levels_base64(all)}});
-  }
-  const TaxelArray array = windows_.array();
-  std::string text = dumped({{"map", colour_map_base64()},
-                             {"rows", array.rows},
-                             {"columns", array.columns},
-                             {"scale", windows_.settings().scale},
-                             {"passes", passes}});
-  for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;) text.replace(at, 1, "\\u003c");
-  return text;
-}
-
-std::string EvaluationPage::html(const Ensemble& network, std::span<const std::uint32_t> test,
-                                 const nlohmann::ordered_json& result,
+std::string EvaluationPage::html(const Ensemble& network, const nlohmann::ordered_json& result,
                                  const std::vector<std::pair<std::string, std::string>>& made_by) const {
   const std::vector<ScoredWindow> best = extremes(true), worst = extremes(false);
   std::vector<ScoredWindow> of_groups;
@@ -282,8 +201,7 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
   for (std::size_t i = 0; i < std::min(groups, kGroups) && groups > 1; ++i)
     std::ranges::copy(extremes(false, result["groups"][i]["name"].get<std::string>(), kOfGroup),
                       std::back_inserter(of_groups));
-  const std::vector<std::uint32_t> frames = film_frames(test);
-  std::vector<std::uint32_t> chosen = frames;
+  std::vector<std::uint32_t> chosen;
   for (const std::vector<ScoredWindow>* some : {&best, &worst, &std::as_const(of_groups)})
     for (const ScoredWindow& one : *some) chosen.push_back(one.window);
   std::sort(chosen.begin(), chosen.end());
@@ -302,20 +220,8 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
              shown("The worst windows", "in contact, by SSIM; no two within 3 mm of one pass, or 20 frames",
                    worst, pictures) +
              shown("The best windows", "of those with something on a quarter of the picture", best, pictures);
-  content += page_section(
-      "Films", "each pass of the test side; felt, drawn, true",
-      "<div class=\"controls\"><select id=\"pass\" aria-label=\"pass\"></select><button "
-      "id=\"play\">Play</button>"
-      "<input id=\"at\" type=\"range\" min=\"0\" value=\"0\" aria-label=\"place in the pass\"></div>"
-      "<div class=\"film\"><figure><canvas id=\"film-felt\"></canvas>felt</figure><figure><canvas "
-      "id=\"film-drawn\">"
-      "</canvas>drawn</figure><figure><canvas id=\"film-true\"></canvas>true</figure></div>"
-      "<p class=\"quiet\" id=\"film-label\" role=\"status\"></p><canvas id=\"bar\" "
-      "style=\"width:100%\"></canvas>"
-      "<p class=\"quiet ends\"><span>0: nothing, not pressed</span><span>1: the highest, "
-      "pressed hard</span></p>");
   content += page_section("What made this page", "", page_facts(made_by));
-  return result_page("SuperTac evaluation", content, films(frames, pictures));
+  return result_page("SuperTac evaluation", content);
 }
 
 }  // namespace supertac

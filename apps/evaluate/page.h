@@ -18,7 +18,7 @@ namespace supertac {
 /// Scores beside those of the baselines, by group or plate (the worst first), zone and distance since the
 /// first contact; the three worst windows in contact of each of the eight worst groups; the twelve worst
 /// windows in contact, and the twelve best of those with texture on a quarter of the picture, no two of them
-/// within 3 mm of one pass; a film of each pass; and what made it all.
+/// within 3 mm of one pass; and what made it all.
 class EvaluationPage {
  public:
   explicit EvaluationPage(const WindowSet& windows) : windows_(windows) {}
@@ -26,12 +26,11 @@ class EvaluationPage {
   void add(const Drawn& drawn, double ssim);
 
   /// `result` is the evaluation's JSON; `made_by` says what to repeat it with, a name and a text each. The
-  /// windows shown are drawn once more. At most kFilmFrames pictures are in the films, evenly spread.
-  std::string html(const Ensemble& network, std::span<const std::uint32_t> test,
-                   const nlohmann::ordered_json& result,
+  /// windows shown are drawn once more.
+  std::string html(const Ensemble& network, const nlohmann::ordered_json& result,
                    const std::vector<std::pair<std::string, std::string>>& made_by) const;
 
-  static constexpr std::size_t kShown = 12, kGroups = 8, kOfGroup = 3, kFilmFrames = 2400, kFramesOfPass = 80;
+  static constexpr std::size_t kShown = 12, kGroups = 8, kOfGroup = 3;
 
  private:
   struct ScoredWindow {
@@ -42,12 +41,9 @@ class EvaluationPage {
   /// Of all groups, or of one.
   std::vector<ScoredWindow> extremes(bool best, const std::string& group = {},
                                      std::size_t most = kShown) const;
-  std::vector<std::uint32_t> film_frames(std::span<const std::uint32_t> test) const;
   std::string by_group(const nlohmann::ordered_json& groups) const;
   std::string shown(const std::string& title, const std::string& note,
                     const std::vector<ScoredWindow>& chosen,
-                    const std::map<std::uint32_t, ShownWindow>& pictures) const;
-  std::string films(std::span<const std::uint32_t> frames,
                     const std::map<std::uint32_t, ShownWindow>& pictures) const;
   std::string name_of(std::uint32_t window) const;
 

@@ -147,7 +147,7 @@ nlohmann::ordered_json GroupScores::to_json() const {
 }
 
 std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result, const GroupScores& groups) {
-  constexpr double kHardly = 0.02, kCoin = 0.5;
+  constexpr double kHardly = 0.02;
   constexpr std::size_t kFew = 3;
   std::vector<std::string> remarks;
   const auto ssim_of = [](const nlohmann::ordered_json& scores) {
@@ -161,10 +161,6 @@ std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result,
       remarks.push_back("the network's contact SSIM, " + format(own, 3) +
                         ", is hardly above that of ridge regression, " + format(ridge, 3) +
                         ": more or other recordings, or longer training, would have to help");
-  if (const auto& trust = result["trust"]; trust.contains("auroc") && trust["auroc"].is_number())
-    if (const double auroc = trust["auroc"].get<double>(); auroc < kCoin)
-      remarks.push_back("predicted errors tell less than a coin which pictures are bad (AUROC " +
-                        format(auroc, 3) + "): do not rely on them here");
   if (groups.by_group() && groups.size() < kFew)
     remarks.push_back(std::to_string(groups.size()) + (groups.size() == 1 ? " group was" : " groups were") +
                       " tested: others may be drawn much better or worse; --split group --leave-out NAME of "

@@ -105,7 +105,7 @@ class GroupScores {
 };
 
 /// What a reader of the scores should know: `result` is the evaluation's JSON. That a network is hardly above
-/// ridge regression, that its predicted errors tell less than a coin, that few groups were tested.
+/// ridge regression, that few groups were tested.
 std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result, const GroupScores& groups);
 
 /// Whether a network knows when its picture is a guess: what it says of its own pictures against what is

@@ -22,7 +22,7 @@ class Scale {
     low_ = of(low), high_ = of(high);
     const double room =
         high_ > low_ ? kRoom * (high_ - low_) : std::max(logarithmic_ ? 0.1 : 1e-6, 0.1 * std::abs(low_));
-    low_ = std::max(low_ - room, logarithmic_ ? -700 : axis.least);
+    low_ -= room;
     high_ = std::min(high_ + room, logarithmic_ ? 700 : axis.most);
     if (low_ >= high_) high_ = low_ + 1;
   }
@@ -132,14 +132,8 @@ std::string chart_svg(const std::string& title, const ChartAxis& x, const ChartA
       if (s.dots)
         marks += "<circle cx=\"" + format(px, 1) + "\" cy=\"" + format(py, 1) + "\" r=\"3.5\" fill=\"" +
                  colour + "\"/>";
-      const bool first = px < kWidth - kLeft, above = k % 2 == 0;
-      if (k < s.labels.size())
-        marks +=
-            text(first ? px + 7 : px - 7, above ? py - 4 : py + 13, first ? "start" : "end", s.labels[k]);
     }
-    if (s.line)
-      svg +=
-          "<polyline fill=\"none\" stroke-width=\"1.8\" stroke=\"" + colour + "\" points=\"" + line + "\"/>";
+    svg += "<polyline fill=\"none\" stroke-width=\"1.8\" stroke=\"" + colour + "\" points=\"" + line + "\"/>";
     svg += marks;
     if (series.size() == 1) continue;
     svg += "<rect x=\"" + format(legend, 1) + "\" y=\"22\" width=\"14\" height=\"4\" fill=\"" + colour +

@@ -45,11 +45,10 @@ std::string picture_address(const Picture& picture) {
          base64(std::span(reinterpret_cast<const std::uint8_t*>(file.data()), file.size()));
 }
 
-std::string result_page(const std::string& title, const std::string& content, const std::string& films) {
+std::string result_page(const std::string& title, const std::string& content) {
   std::string page(report_page_frame());
   replace(page, "<!--title-->", escaped(title));
   replace(page, "<!--content-->", content);
-  replace(page, "<!--films-->", films);
   return page;
 }
 

@@ -26,8 +26,7 @@ std::string page_facts(const std::vector<std::pair<std::string, std::string>>& f
 /// A picture as the address of an <img>, itself in it.
 std::string picture_address(const Picture& picture);
 
-/// The whole page: `content` is HTML, `films` the JSON that report.js shows in its canvases.
-std::string result_page(const std::string& title, const std::string& content,
-                        const std::string& films = R"({"passes":[]})");
+/// The whole page: `content` is HTML.
+std::string result_page(const std::string& title, const std::string& content);
 
 }  // namespace supertac
