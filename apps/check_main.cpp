@@ -1,9 +1,11 @@
 // supertac-check: what an auditor asks of this machine, of a file and of a training.
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <map>
 
 #include "apps/check/check.h"
 #include "apps/common/command_line/program.h"
@@ -21,7 +23,8 @@ void declare(Arguments& a) {
       "recordings (--data) are those that the header OTHER of its C code states, and give that code and "
       "picture; "
       "training FILE --data DIR: repeats "
-      "parts of a training that kept a ledger; step FILE --data DIR --at N: opens one step of it, with every "
+      "parts of a training that kept a ledger; step FILE --data DIR --step N: opens one step of it, with "
+      "every "
       "operator; ledgers FILE OTHER: the first difference of two, or of two steps that were opened with "
       "--json");
   a.positional("FILE", "what is checked", false);
@@ -30,7 +33,7 @@ void declare(Arguments& a) {
   a.option("picture", "HEX", "chain: what the self-test said on the device, 16 digits");
   a.option("segments", "K", "training: how many of its twenty parts are repeated", "1");
   a.option("seed", "N", "training: draws them", "0");
-  a.option("at", "N", "step: which one, from 1");
+  a.option("step", "N", "step: which one, from 1");
   a.option(
       "operator", "NAME",
       "step: the arrays of those whose name begins so are written to --out (3/ is the fourth micro-batch, "
@@ -56,6 +59,14 @@ int check_gradients(const Arguments& a) {
   throw FileError(program, std::string("cannot be run: ") + std::strerror(errno));
 }
 
+const std::map<const char*, std::vector<std::string>> kOptionsOf = {{"data", {"chain", "training", "step"}},
+                                                                    {"picture", {"chain"}},
+                                                                    {"segments", {"training"}},
+                                                                    {"seed", {"training"}},
+                                                                    {"step", {"step"}},
+                                                                    {"operator", {"step"}},
+                                                                    {"out", {"step"}}};
+
 void need(const Arguments& a, const std::string& name) {
   if (!a.given(name)) throw UsageError(a.text("WHAT") + ": expected " + name + ", found none");
 }
@@ -65,6 +76,9 @@ void need(const Arguments& a, const std::string& name) {
 int run(Arguments& a) {
   const std::string what = a.choice(
       "WHAT", {"gradients", "bits", "machine", "udev", "file", "chain", "training", "step", "ledgers"});
+  for (const auto& [option, of] : kOptionsOf)
+    if (a.given(option) && std::ranges::find(of, what) == of.end())
+      throw UsageError(std::string("--") + option + ": nothing that " + what + " reads; leave it out");
   if (what == "gradients") return check_gradients(a);
   if (what == "bits") return check_bits(a);
   if (what == "machine") return check_machine(a);
@@ -75,7 +89,7 @@ int run(Arguments& a) {
   if (what == "chain") return check_chain(a);
   if (what == "ledgers") return check_ledgers(a);
   if (what == "training") return check_training(a);
-  need(a, "at");
+  need(a, "step");
   return check_step(a);
 }
 

@@ -44,9 +44,6 @@ SimulatorSettings read_settings(const Arguments& arguments, const Sensor& sensor
     settings.body = sensor.body;
     settings.filter_s = 0, settings.with_adc = false;  // the rig's board has these
   }
-  for (const std::string& term : arguments.list("without")) {
-    settings = read_option("without", [&] { return without_term(settings, term); });
-  }
   return settings;
 }
 
@@ -80,7 +77,7 @@ std::vector<Job> plan_passes(const Arguments& arguments, const std::vector<Plate
 
 std::vector<Job> plan_presses(const Arguments& arguments, const Sensor& sensor, OutputFolder& folder) {
   constexpr int kPressesOfARecording = 125;
-  for (const char* other : {"plates", "speeds", "trials", "passes", "without"})
+  for (const char* other : {"plates", "speeds", "trials", "passes"})
     if (arguments.given(other))
       throw UsageError(std::string("--presses: nothing slides over a plate; leave --") + other + " out");
   const int scale = std::stoi(arguments.choice("scale", {"2", "4", "8", "16"}));
@@ -143,9 +140,11 @@ void declare(Arguments& arguments) {
       .option("speeds", "MM_PER_S,...", "sliding speeds in mm/s", "5,10")
       .option("trials", "N", "trials of every plate and speed", "2")
       .option("passes", "N", "passes of every trial, 5 mm apart in x (at most 8)", "8")
-      .option("sensor", "FILE",
-              "a sensor's file, or rig: its array, rate, unit, polarity and range instead of the rig's",
-              "rig")
+      .option(
+          "sensor", "FILE",
+          "a sensor's file: its array, rate, unit, polarity and range instead of the rig's; rig: the rig's "
+          "frames before the board's filter",
+          "rig")
       .option(
           "presses", "N",
           "instead of passes N presses of the sensor: none to four objects at a time that come, move and go, "
@@ -158,7 +157,6 @@ void declare(Arguments& arguments) {
               "--sensor FILE "
               "first")
       .option("scale", "N", "of --presses: truth N times as fine as the array: 2, 4, 8 or 16", "4")
-      .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms(), ", "))
       .option("seed", "N", "the same seed gives the same files", "1");
 }
 

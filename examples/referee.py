@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Computes operators of a training step again, to the bit, with NumPy alone, and says which entry differs.
 
-    supertac-check step model.safetensors --data DIR --at 40 --operator 3/ --out operators.safetensors
+    supertac-check step model.safetensors --data DIR --step 40 --operator 3/ --out operators.safetensors
     examples/referee.py operators.safetensors
 
 It follows docs/numerics.md and uses nothing of the program. Arrays are named by their SHA-256, which is checked first.

@@ -65,7 +65,7 @@ int check_step(const Arguments& a) {
   const std::string model = a.text("FILE");
   Repetition training(a, model);
   Trainer& trainer = training.trainer();
-  const std::int64_t step = a.integer("at", 1, trainer.total_steps());
+  const std::int64_t step = a.integer("step", 1, trainer.total_steps());
   auto d = go_before(training, step, a);
   OpenedStep opened;
   if (!d) {

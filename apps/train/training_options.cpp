@@ -91,7 +91,7 @@ void declare_training(Arguments& a) {
       "still)",
       "paper");
   a.option(
-      "like", "MODEL",
+      "recipe-of", "MODEL",
       "begin with the recipe of this model instead: with the same recordings and no other option the same "
       "network comes out again, byte for byte");
   a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512, or 1 (default: the preset's)");
@@ -117,11 +117,11 @@ static std::optional<Scaling> stated_range(const Arguments& a) {
 }
 
 Recipe recipe_of(const Arguments& a) {
-  if (a.given("like") && a.given("preset"))
-    throw UsageError("expected --preset NAME or --like MODEL, found both");
+  if (a.given("recipe-of") && a.given("preset"))
+    throw UsageError("expected --preset NAME or --recipe-of MODEL, found both");
   Recipe r;
-  if (a.given("like")) {
-    r = Recipe::of(load_model(a.text("like")), a.text("like"));
+  if (a.given("recipe-of")) {
+    r = Recipe::of(load_model(a.text("recipe-of")), a.text("recipe-of"));
   } else {
     r = Recipe::named(a.choice("preset", {"paper", "tiny", "frame"}));
   }

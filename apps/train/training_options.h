@@ -8,7 +8,7 @@ namespace supertac {
 
 /// Split, steps, network, windows, augmentation and loss: all but the recordings and the seed.
 void declare_training(Arguments& a);
-/// The recipe of --preset or of the model --like, with all options over it, --seed included. Throws
+/// The recipe of --preset or of the model --recipe-of, with all options over it, --seed included. Throws
 /// UsageError, and as load_model() and Recipe::of().
 Recipe recipe_of(const Arguments& a);
 

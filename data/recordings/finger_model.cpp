@@ -7,7 +7,6 @@
 #include "io/numbers/hash.h"
 #include "io/numbers/random.h"
 #include "io/numbers/same_bits.h"
-#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -37,29 +36,6 @@ int points_along(const TaxelArray& a) { return points_of(a.rows, a.pitch_mm.y, k
 constexpr double kCellMm = 0.25, kMarginMm = 12;
 constexpr int kColumns = static_cast<int>((Plate::kWidthMm + 2 * kMarginMm) / kCellMm) + 1;
 constexpr int kRows = static_cast<int>((Plate::kLengthMm + 2 * kMarginMm) / kCellMm) + 1;
-
-struct Term {
-  const char* name;
-  void (*leave_out)(SimulatorSettings&);
-};
-constexpr Term kTerms[] = {
-    {"mount", [](SimulatorSettings& s) { s.with_mount = false; }},
-    {"pad", [](SimulatorSettings& s) { s.body.skin_mm = 0.6; }},
-    {"dome", [](SimulatorSettings& s) { s.body.shape = BodyShape::flat, s.body.radius_mm = 0; }},
-    {"edges", [](SimulatorSettings& s) { s.with_edges = false; }},
-    {"tilt", [](SimulatorSettings& s) { s.tilt_spread = 0; }},
-    {"gains", [](SimulatorSettings& s) { s.with_gains = false; }},
-    {"variation", [](SimulatorSettings& s) { s.with_variation = false; }},
-    {"vibration", [](SimulatorSettings& s) { s.vibration_mm = 0; }},
-    {"drift", [](SimulatorSettings& s) { s.drift_volts_per_s = 0; }},
-    {"emi", [](SimulatorSettings& s) { s.emi_volts = 0; }},
-    {"noise", [](SimulatorSettings& s) { s.noise_volts = 0; }},
-    {"adc", [](SimulatorSettings& s) { s.with_adc = false; }},
-    {"filter", [](SimulatorSettings& s) { s.filter_s = 0; }},
-    {"saturation", [](SimulatorSettings& s) { s.with_saturation = false; }},
-    {"jitter", [](SimulatorSettings& s) { s.jitter_s = 0; }},
-    {"loss", [](SimulatorSettings& s) { s.lost_fraction = 0; }},
-};
 
 // As often half as twice.
 double factor(double v) { return v >= 0 ? 1 + v : 1 / (1 - v); }
@@ -99,25 +75,6 @@ std::uint64_t pass_stream(const Plate& plate, const FingerIdentity& id) {
 }
 
 }  // namespace
-
-const std::vector<std::string>& simulator_terms() {
-  static const std::vector<std::string> kNames = [] {
-    std::vector<std::string> names;
-    for (const Term& term : kTerms) names.emplace_back(term.name);
-    return names;
-  }();
-  return kNames;
-}
-
-SimulatorSettings without_term(SimulatorSettings settings, const std::string& name) {
-  for (const Term& term : kTerms) {
-    if (name != term.name) continue;
-    term.leave_out(settings);
-    return settings;
-  }
-  throw std::invalid_argument("simulator: unknown term \"" + name + "\"; known are " +
-                              joined(simulator_terms(), ", "));
-}
 
 FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& id)
     : settings_(settings), noise_seed_(id.seed), noise_stream_(pass_stream(plate, id) + 1) {

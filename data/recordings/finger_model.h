@@ -9,8 +9,8 @@
 
 namespace supertac {
 
-/// What the simulated sensor does to the scene, and how strongly; without_term() leaves one of its terms out.
-/// Defaults resemble the rig's recordings; docs/import.md shows what each term changes.
+/// What the simulated sensor does to the scene, and how strongly. Defaults resemble the rig's recordings;
+/// docs/import.md shows what each term changes.
 struct SimulatorSettings {
   TaxelArray array;  ///< of one channel or three axes; gains and pad are the rig's whatever the array
   double rate_hz = 300;
@@ -39,11 +39,6 @@ struct SimulatorSettings {
   double jitter_s = 2e-4;           ///< a sample is taken a little off the time it is stamped with
   double lost_fraction = 0.002;
 };
-
-/// Names of the terms ("mount", "pad", ... "loss"), and the settings without one of them.
-/// Throws std::invalid_argument for an unknown term, listing the known ones.
-const std::vector<std::string>& simulator_terms();
-SimulatorSettings without_term(SimulatorSettings settings, const std::string& term);
 
 /// Where the finger's centre is; z_mm = 0 is first contact with the flat plate, negative is pressed.
 struct FingerPose {

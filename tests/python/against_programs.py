@@ -246,7 +246,7 @@ def main():
                 good &= compare(folder, data, preset, data / recordings[0].name)
         raw = folder / "unfiltered"
         run("supertac-simulate", "--out", raw, "--plates", "6_Ridges", "--passes", 1, "--trials", 1, "--speeds", 10,
-            "--without", "filter", "--quiet")
+            "--sensor", "rig", "--quiet")
         good &= compare(folder, raw, "tiny", next(raw.glob("*.safetensors")), folder / "tiny4x4.safetensors")
         recording = supertac.read_recording(recordings[0])
         good &= clients(supertac.load(folder / "tiny4x4.safetensors"), recording)

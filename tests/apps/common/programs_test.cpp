@@ -96,7 +96,6 @@ TEST_F(Simulate, AWrongCommandLineIsCode2) {
       {"--speeds 0", "--speeds: expected numbers from 0.5 to 50, found '0'"},
       {"--speeds 1,5e", "found '5e'"},
       {"--plates moon", "moon"},
-      {"--without gravity", "gravity"},
       {"--threads 0", "--threads: expected a whole number from 1 to 1024"},
       {"more", "unexpected argument 'more'"}};
   for (const auto& [options, text] : cases) {

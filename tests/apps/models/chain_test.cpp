@@ -136,7 +136,7 @@ TEST_F(Chain, HoldsFromTheRecordingsToThePicture) {
 }
 
 TEST_F(Chain, ATrainingAgainGivesTheSameChain) {
-  succeed("supertac-train --like model.safetensors --data data --out changed/again.safetensors");
+  succeed("supertac-train --recipe-of model.safetensors --data data --out changed/again.safetensors");
   succeed("supertac-check chain changed/again.safetensors code/finger.h --data data");
 }
 

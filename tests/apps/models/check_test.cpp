@@ -173,18 +173,20 @@ TEST_F(Audit, TwoTrainingsPartAtAnOperator) {
 
   // The same step of both, each opened for itself.
   for (const std::string name : {"first", "second"})
-    succeed("supertac-check step " + name + ".safetensors --data data --at 1 --json " + name + ".json");
+    succeed("supertac-check step " + name + ".safetensors --data data --step 1 --json " + name + ".json");
   const auto opened = run("supertac-check ledgers first.json second.json");
   EXPECT_EQ(opened.code, 1);
   EXPECT_TRUE(std::regex_search(opened.out, std::regex("0/[0-9]+\\.scale, the settings"))) << opened.out;
   succeed("supertac-check ledgers first.json first.json");
+  expect_failure(run("supertac-check ledgers first.json first.json --data data"), 2,
+                 "--data: nothing that ledgers reads");
 }
 
 // Every operator of a step once more by NumPy, to the bit, and one of which a bit was changed.
 TEST_F(Audit, ARefereeComputesAStepAgain) {
   train("judged.safetensors", "--batch 32");
   const auto open = [&](const std::string& name, const std::string& out) {
-    return run("supertac-check step judged.safetensors --data data --at 3 --operator " + name + " --out " +
+    return run("supertac-check step judged.safetensors --data data --step 3 --operator " + name + " --out " +
                out);
   };
   EXPECT_EQ(open("9/", "none.safetensors").code, 2);

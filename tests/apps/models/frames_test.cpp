@@ -75,7 +75,7 @@ TEST_F(Frames, SameBytesForAnyThreadsAndAfterAPause) {
   EXPECT_EQ(bytes("1.safetensors"), bytes("2.safetensors"));
   train("3.safetensors", "--resume 1.run/last.safetensors");
   EXPECT_EQ(bytes("1.safetensors"), bytes("3.safetensors"));
-  succeed("supertac-train --data data --like 1.safetensors --out 4.safetensors");
+  succeed("supertac-train --data data --recipe-of 1.safetensors --out 4.safetensors");
   EXPECT_EQ(json("1.run/settings.json")["content"], json("4.run/settings.json")["content"]);
 }
 
@@ -86,7 +86,7 @@ TEST_F(Frames, TheFactorOfTheIntervalsIsFoundOrStated) {
     return file.metadata().contains("interval_factor") ? file.metadata().at("interval_factor") : "none";
   };
   train("a.safetensors");
-  succeed("supertac-train --data data --like a.safetensors --seed 3 --out b.safetensors");
+  succeed("supertac-train --data data --recipe-of a.safetensors --seed 3 --out b.safetensors");
   train("c.safetensors", "--interval-factor 1.7");
   train("d.safetensors", "--split none");
   EXPECT_GT(std::stod(factor("a.safetensors")), 0);

@@ -50,7 +50,7 @@ TEST_F(Sweep, WritesARowAModelAndDoesNotRepeatIt) {
 
   // It trains as supertac-train does: one model can be trained again without the others.
   const std::string model = path("grid/models/" + names[1] + ".safetensors");
-  succeed("supertac-train --data data --out same.safetensors --threads 1 --like " + model);
+  succeed("supertac-train --data data --out same.safetensors --threads 1 --recipe-of " + model);
   EXPECT_EQ(content_hash(SafetensorsFile::read(path("same.safetensors"))),
             content_hash(SafetensorsFile::read(model)));
 

@@ -60,7 +60,7 @@ TEST_F(Training, NamesThePlatesThereAre) {
 
 TEST_F(Training, EvaluationWarnsOfSignalsThroughAnotherFilter) {
   trained("filtered.safetensors", "--epochs 1");
-  succeed("supertac-simulate --out raw --plates 3_Bumps --speeds 10 --passes 1 --without filter");
+  succeed("supertac-simulate --out raw --plates 3_Bumps --speeds 10 --passes 1 --sensor rig");
   const auto warned_on = [](const std::string& data) {
     return contains(run("supertac-evaluate --model filtered.safetensors --limit 20 --data " + data).error,
                     "a moving average of 0 s, those of the training through one of 0.0992 s");
@@ -153,7 +153,7 @@ TEST_F(Training, LikeRepeatsATrainingToTheSameContent) {
       "first.safetensors",
       "--optimizer muon --seed 7 --split pass --stride 128 --epochs 1 --random-plates 2 --interval-factor "
       "1.5");
-  const std::string like = "supertac-train --data data --like first.safetensors --out ";
+  const std::string like = "supertac-train --data data --recipe-of first.safetensors --out ";
   succeed(like + "again.safetensors");
   EXPECT_EQ(content_hash(SafetensorsFile::read(path("first.safetensors"))),
             content_hash(SafetensorsFile::read(path("again.safetensors"))));
@@ -163,7 +163,7 @@ TEST_F(Training, LikeRepeatsATrainingToTheSameContent) {
   EXPECT_NE(content_hash(SafetensorsFile::read(path("first.safetensors"))),
             content_hash(SafetensorsFile::read(path("other.safetensors"))));
   expect_exit(run(like + "no.safetensors --preset tiny"), 2,
-              "expected --preset NAME or --like MODEL, found both");
+              "expected --preset NAME or --recipe-of MODEL, found both");
 }
 
 TEST_F(Training, DataThatTeachNothingAreRemarkedOn) {

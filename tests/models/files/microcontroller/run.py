@@ -173,7 +173,7 @@ def main():
     parser.add_argument("--model")
     parser.add_argument("--data", help="recordings for MODEL, of signals that have gone through no filter")
     parser.add_argument("--windows", type=int, default=1000)
-    parser.add_argument("--frames", type=int, default=1200)
+    parser.add_argument("--frames", type=int, default=3000)
     parser.add_argument("--csv", help="adds a line for each part to this file")
     parser.add_argument("--preset", default="tiny", help="of the small one")
     args = parser.parse_args()
@@ -202,7 +202,7 @@ def main():
         args.raw = args.data  # frames as a sensor gives them: the device filters them as the training signals were
         if args.model is None:
             args.model, args.data = trained(args.bin, folder, args.preset)
-            args.raw = simulated(args.bin, folder + "/raw", "--trials", "1", "--plates", "ridges6", "--without", "filter")
+            args.raw = simulated(args.bin, folder + "/raw", "--trials", "1", "--plates", "ridges6", "--sensor", "rig")
         recording = first_of(args.raw)
         subprocess.run([args.bin + "/supertac-export", args.model, "--c99", folder, "--name", "finger", "--sensor-hz",
                         repr(rate_of(recording)), "--force"], check=True, stdout=subprocess.DEVNULL)
