@@ -167,13 +167,6 @@ TEST(TextFolder, WhatIsNoPassIsLeftOutByName) {
     EXPECT_NE(left_out.find(reason), std::string::npos) << reason << "\n" << left_out;
 }
 
-TEST(TextFolder, TwoFilesOfOnePassAreNamed) {
-  const TemporaryFolder folder;
-  const std::string first = put(folder, "plain/1/01.txt", ""), second = put(folder, "plain/1/1.txt", "");
-  EXPECT_EQ(what_of<FileError>([&] { import_all(folder.path(), {}); }),
-            second + ": is the same trial and pass as " + first + "; rename one of them");
-}
-
 TEST(TextFolder, AFolderOfAnotherShapeIsNamed) {
   const std::string number = "expected a number from 1 as its name: TEXT_DIR/<plate>/<trial>/<pass>.txt";
   const std::tuple<std::string, std::string, std::string> cases[] = {

@@ -103,24 +103,6 @@ TEST_F(Array, ASignalEndsTheFitOfTheBaselines) {
   EXPECT_EQ(result.code, 130) << result.error;
 }
 
-// Three numbers a taxel, as a magnetic sensor gives, on an array that is no square.
-TEST_F(Array, ThreeChannelsOfTwoBySix) {
-  simulate(2, 6, "2.5");
-  for (const std::string& file : list_recordings(path("data"))) {
-    Recording recording = read_recording(file);
-    const std::vector<float> one = recording.signals;
-    recording.array.channels = 3;
-    recording.signals.clear();
-    for (const float v : one) recording.signals.insert(recording.signals.end(), {v, 0.5F * v + 1.2F, 2.4F});
-    write_recording(file, recording);
-  }
-  train("data");
-  EXPECT_TRUE(evaluate("data").at("all").at("ssim").is_number());
-  const SafetensorsFile outputs = SafetensorsFile::read(path("outputs.safetensors"));
-  EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<std::uint64_t>{40, 32, 36}));
-  EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{40, 8, 24}));
-}
-
 // Signals from 68 to 102 would all be clipped to nothing by the rig's range.
 TEST_F(Array, SignalsOfAnotherRangeAreNoticed) {
   simulate(3, 5, "2.5");
@@ -162,9 +144,6 @@ TEST_F(Array, IsSimulatedAsASensorsFileSays) {
   EXPECT_GT(low, 0);
   EXPECT_GT(high, 300);
   EXPECT_LT(high, 910);
-  train("sim");
-  EXPECT_EQ(load_model(path("m.safetensors")).array(), recording.array);
-  EXPECT_TRUE(evaluate("sim").at("all").at("ssim").is_number());
 }
 
 // A log that another program kept: milliseconds, positions, names, a file for every second or so.

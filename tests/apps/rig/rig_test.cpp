@@ -52,28 +52,12 @@ TEST_F(RigTest, CollectShowsALiveLineAndReportsEveryPass) {
   EXPECT_EQ(recording.plate, "my.stl");
   // At first the finger is in the air: at rest, however long this machine has been running.
   for (std::size_t k = 0; k < kTaxels; ++k) EXPECT_NEAR(recording.signals[k], 2.44, 0.05) << "taxel " << k;
+  succeed("supertac-import --journal out/my.stl_t1_v50.journal --out saved");
+  EXPECT_EQ(bytes("saved/my.stl"), bytes("my.stl"));
   // The folder holds its plate: truths can be drawn wherever it is moved.
   std::filesystem::rename(path("out"), path("moved"));
   std::filesystem::remove(path("my.stl"));
   EXPECT_GT(WindowSet::load(path("moved"), {}, {.timesteps = 32}).size(), 100u);
-}
-
-TEST_F(RigTest, ACollectionThatWasKilledIsRecoveredByImport) {
-  RunningProcess process = start_in(folder_.path(), collect_ + "--speed 10");
-  const std::string journal = "out/my.stl_t1_v10.journal";
-  wait_for_file(path(journal), 2'500'000);
-  process.send(SIGKILL);
-  EXPECT_EQ(process.wait().code, 128 + SIGKILL);
-  const ProcessResult recovered =
-      succeed("supertac-import --journal " + journal + " --out saved --json saved.json");
-  EXPECT_TRUE(contains(recovered.out, "the collection was cut off"));
-  const Recording recording = read_recording(path("saved/my.stl_t1_p1_v10.safetensors"));
-  EXPECT_EQ(recording.metadata.at("complete"), "false");
-  EXPECT_EQ(bytes("saved/my.stl"), bytes("my.stl"));
-  const auto report = nlohmann::json::parse(bytes("saved.json"));
-  EXPECT_EQ(report["complete"], false);
-  EXPECT_EQ(report["frames"], recording.frames());
-  expect_exit(run("supertac-import --journal " + journal + " --out saved"), 1, "--force");
 }
 
 using ImportJournal = ProgramTest;

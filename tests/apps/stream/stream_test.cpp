@@ -168,6 +168,10 @@ TEST_F(Streaming, TakesModelsOfAnyWindowAndRefusesWhatWasFilteredOtherwise) {
   expect_failure(stream("--recording recording"), 1, "moving average of 0.0992 s, the model was");
   write_model(model(), kTimesteps, std::nullopt);
   EXPECT_EQ(stream("--recording recording").code, 0);
+  write_recording(path("mat"), simulate_pass(Plate::named("bumps12"), {},
+                                             {.array = {.rows = 2, .columns = 6, .pitch_mm = 2}}));
+  expect_failure(stream("--recording mat"), 1,
+                 "signals are those of 2x6 taxels at 2 mm, the model was trained on 4x4 taxels at 3 mm");
 }
 
 TEST_F(Streaming, FilesThatAreMissingOrOfAnotherKindAreNamed) {
