@@ -19,7 +19,7 @@
 #include "io/numbers/numbers.h"
 #include "library/guard.h"
 #include "models/files/model_file.h"
-#include "models/inference/compiled/compiled_model.h"
+#include "models/inference/ensemble.h"
 #include "models/training/train.h"
 
 using namespace supertac;
@@ -27,7 +27,7 @@ using c::expect, c::expect_within, c::guarded;
 
 struct supertac_model {
   ModelFile file;
-  CompiledModel compiled;
+  Ensemble network;  // of this one
 };
 
 struct supertac_pairs {
@@ -62,8 +62,8 @@ thread_local bool alone = false;
 supertac_model* opened(ModelFile file, int precision) {
   expect(precision == SUPERTAC_FP32 || precision == SUPERTAC_INT8,
          "precision: expected SUPERTAC_FP32 or SUPERTAC_INT8");
-  CompiledModel ready = compiled(file, precision == SUPERTAC_INT8 ? Precision::int8 : Precision::fp32);
-  return new supertac_model{std::move(file), std::move(ready)};
+  Ensemble network = ensemble_of({&file, 1}, precision == SUPERTAC_INT8 ? Precision::int8 : Precision::fp32);
+  return new supertac_model{std::move(file), std::move(network)};
 }
 
 // Windows in the sensor's unit to what the network takes.
@@ -78,7 +78,7 @@ void scale(const ModelFile& file, std::span<float> windows) {
 }
 
 void draw(const supertac_model& model, const Tensor& inputs, float* pictures, float* predicted_errors) {
-  const Estimate drawn = model.compiled.estimate(inputs);
+  const Estimate drawn = model.network.estimate(inputs);
   expect(predicted_errors == nullptr || drawn.predicted_error.size() > 0, "the model predicts no error");
   std::copy_n(drawn.picture.data(), drawn.picture.size(), pictures);
   if (predicted_errors != nullptr)

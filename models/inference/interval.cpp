@@ -30,16 +30,36 @@ void PixelInterval::half_widths(std::span<const float> picture, std::int64_t wid
         along * steepest(picture, static_cast<std::size_t>(width), i) + beside * at_least(predicted_error[i]);
 }
 
-std::string PixelInterval::text() const { return (shift > 0 ? format(shift) + "," : "") + format(factor); }
+std::string PixelInterval::text() const {
+  return (shift > 0 || load > 0 ? format(shift) + "," : "") + format(factor) +
+         (load > 0 ? "," + format(load) : "");
+}
 
 std::optional<PixelInterval> PixelInterval::read(const std::string& text) {
   const std::vector<std::string> parts = comma_list(text);
-  if (parts.empty() || parts.size() > 2) return std::nullopt;
-  const auto shift = parts.size() == 2 ? parse_double(parts.front()) : 0.0,
-             factor = parse_double(parts.back());
-  if (!shift || !factor || !(*shift >= 0 && *shift <= 10) || !(*factor >= 0.05 && *factor <= 100))
+  if (parts.empty() || parts.size() > 3) return std::nullopt;
+  const auto shift = parts.size() > 1 ? parse_double(parts.front()) : 0.0,
+             factor = parse_double(parts[parts.size() > 1 ? 1 : 0]),
+             load = parts.size() > 2 ? parse_double(parts.back()) : 0.0;
+  if (!shift || !factor || !load || !(*shift >= 0 && *shift <= 10) || !(*factor >= 0.05 && *factor <= 100) ||
+      !(*load >= 0 && *load <= 4096))
     return std::nullopt;
-  return PixelInterval{*shift, *factor};
+  return PixelInterval{*shift, *factor, *load};
+}
+
+void add_load(double load, const NetworkFormat& format, std::span<const float> inputs,
+              std::span<float> predicted_errors) {
+  const auto columns = static_cast<std::size_t>(format.columns),
+             scale = static_cast<std::size_t>(format.scale),
+             channels = static_cast<std::size_t>(format.channels), width = columns * scale,
+             taxels = static_cast<std::size_t>(format.rows) * columns, pixels = taxels * scale * scale,
+             window = static_cast<std::size_t>(format.frames) * taxels * channels;
+  const auto share = static_cast<float>(load / static_cast<double>(channels));
+  for (std::size_t i = 0; i < predicted_errors.size(); ++i) {
+    const std::size_t pixel = i % pixels, taxel = pixel / width / scale * columns + pixel % width / scale;
+    const auto last = inputs.subspan((i / pixels + 1) * window - taxels * channels);
+    for (const float signal : last.subspan(taxel * channels, channels)) predicted_errors[i] += share * signal;
+  }
 }
 
 void IntervalCoverage::add(std::size_t pass, std::span<const float> picture, std::int64_t width,
@@ -57,7 +77,7 @@ void IntervalCoverage::add(std::size_t pass, std::span<const float> picture, std
     if (bin < double{kBins}) ++counts.ratios[static_cast<std::size_t>(bin)];
     ++counts.pixels;
     counts.within += error <= half_width ? 1 : 0;
-    counts.half_width += half_width;
+    counts.half_width += half_width, counts.predicted += predicted;
   }
 }
 
@@ -82,19 +102,29 @@ IntervalCoverage::Held IntervalCoverage::of_height(std::size_t height) const {
   return {held.share / held.pixels, held.half_width / held.pixels, held.pixels};
 }
 
-PixelInterval IntervalCoverage::found() const {
+double IntervalCoverage::mean_half_width(double factor) const {
+  double sum = 0, pixels = 0;
+  for (const Pass& pass : passes_)
+    for (const Height& h : pass.heights) {
+      sum += h.half_width + (factor - judged_.factor) * h.predicted;
+      pixels += static_cast<double>(h.pixels);
+    }
+  return sum / pixels;
+}
+
+PixelInterval IntervalCoverage::found(double share) const {
   std::size_t least = 0;  // bins
   for (std::size_t height = 0; height < kHeights; ++height) {
     double passes = 0, covered = 0;
     for (const Pass& pass : passes_) passes += pass.heights[height].pixels > 0 ? 1 : 0;
     std::size_t bin = 0;
-    for (; bin < kBins && covered < kCovered * passes * (1 - 1e-12); ++bin)
+    for (; bin < kBins && covered < share * passes * (1 - 1e-12); ++bin)
       for (const Pass& pass : passes_)
         if (const Height& h = pass.heights[height]; h.pixels > 0)
           covered += h.ratios[bin] / static_cast<double>(h.pixels);
     least = std::max(least, bin);
   }
-  return {judged_.shift, static_cast<double>(std::max<std::size_t>(least, 1)) / kBinsPerUnit};
+  return {judged_.shift, static_cast<double>(std::max<std::size_t>(least, 1)) / kBinsPerUnit, judged_.load};
 }
 
 }  // namespace supertac

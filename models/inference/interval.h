@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "models/networks/supertac_model.h"
+
 namespace supertac {
 
 /// Smaller predicted errors count as this one, 2.5 of the 255 steps of an 8-bit picture.
@@ -19,12 +21,13 @@ inline float at_least(float predicted_error) { return std::max(predicted_error, 
 /// The interval that holds the truth of nine pixels in ten, v +- w. A picture may stand a little beside the
 /// surface, and be wrong besides; a network can predict the latter only:
 ///   w = shift max |v' - v| + factor at_least(predicted error),    v': the eight pixels around
-/// the first term being, to first order, what a picture `shift` pixels off changes.
+/// the first term being, to first order, what a picture `shift` pixels off changes. A predicted error is the
+/// network's and, where `load` is not 0, what add_load() adds.
 struct PixelInterval {
   /// By default the least shift (in steps of 1/4) and then the least factor (of .05) that hold 90 % in each
   /// class of truths of IntervalCoverage on passes held out of trial 1: four plates, preset paper, split
   /// pass, seeds 0 and 1 (docs/map.md).
-  double shift = 0.75, factor = 0.55;
+  double shift = 0.75, factor = 0.55, load = 0;
 
   /// Of pictures [height][width] and as many predicted errors, which may be `widths` itself; no heap once
   /// that is large. Empty where `predicted_error` is. NaN for pixels that are NaN, which count as no
@@ -32,12 +35,20 @@ struct PixelInterval {
   void half_widths(std::span<const float> picture, std::int64_t width, std::span<const float> predicted_error,
                    std::vector<float>& widths) const;
 
-  /// "0.75,0.55", or "1.45" for a factor without a shift, as older files have it; back from it, or nothing
-  /// for another text, a shift outside 0 to 10 or a factor outside 0.05 to 100.
+  /// "0.75,0.55", with a load "0.75,0.55,16", or "1.45" for a factor without a shift, as older files have it;
+  /// back from it, or nothing for another text, a shift outside 0 to 10, a factor outside 0.05 to 100 or a
+  /// load outside 0 to 4096.
   std::string text() const;
   static std::optional<PixelInterval> read(const std::string& text);
   bool operator==(const PixelInterval&) const = default;
 };
+
+/// A taxel tells the mean of what lies under it, so a pixel there may be up to scale^2 times as high; a
+/// network that has never felt such an object does not know this of itself. Adds to the predicted errors of n
+/// inputs, [n][rows scale][columns scale], of each pixel `load` times the signal of its taxel: of the last
+/// frame, and of its channels the mean.
+void add_load(double load, const NetworkFormat& format, std::span<const float> inputs,
+              std::span<float> predicted_errors);
 
 /// How many pixels' truths lie within picture +- half width, by how high the truth is: most pixels are empty,
 /// so a share of all is a figure about emptiness. Passes are the unit, each counts the same: windows of one
@@ -60,10 +71,11 @@ class IntervalCoverage {
   // Not to be asked when empty():
   double share() const;  ///< of all pixels, mean over passes
   Held of_height(std::size_t height) const;
-  /// With the judged shift the least factor that holds kCovered in each height, in steps of 0.05; 20 where
+  /// With the judged shift the least factor that holds `share` in each height, in steps of 0.05; 20 where
   /// none does (Mondrian conformal prediction with the largest class for all; Vovk, Gammerman, Shafer 2005,
   /// ch. 4.5).
-  PixelInterval found() const;
+  PixelInterval found(double share = kCovered) const;
+  double mean_half_width(double factor) const;  ///< of all pixels, were this the factor
 
  private:
   static constexpr std::size_t kBins = 400;  // of (|error| - shift term) / predicted error below 20
@@ -71,7 +83,7 @@ class IntervalCoverage {
   struct Height {
     std::array<std::uint32_t, kBins> ratios{};
     std::uint64_t pixels = 0, within = 0;
-    double half_width = 0;
+    double half_width = 0, predicted = 0;
   };
   struct Pass {
     std::size_t number;

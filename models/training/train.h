@@ -40,8 +40,9 @@ struct TrainingCallbacks {
 bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks = {});
 
 /// What the model file says of its origin after training: task.origin, and where the recipe leaves it open
-/// the factor of the intervals, IntervalCoverage::factors() of at most 2,000 tested windows. A network that
-/// draws people or objects for the first time is further off than it has learnt to say.
+/// the interval: IntervalCoverage::found() of at most 2,000 tested windows, without a load and with one of
+/// scale^2, whichever is narrower. A network that draws people or objects for the first time is further off
+/// than it has learnt to say.
 std::map<std::string, std::string> trained_origin(const Trainer& trainer, const TrainingTask& task);
 
 /// The model alone, ready for use: with `origin` in its metadata, the ranges of its values for int8 and,

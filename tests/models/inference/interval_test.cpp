@@ -41,8 +41,21 @@ TEST(PixelInterval, IsReadAsItIsWritten) {
   EXPECT_EQ(PixelInterval::read("0.5,3"), (PixelInterval{0.5, 3}));
   EXPECT_EQ(PixelInterval::read("1.45"), (PixelInterval{0, 1.45})) << "what older model files say";
   EXPECT_EQ(PixelInterval::read("1.45")->text(), "1.45");
-  for (const char* wrong : {"", "1,2,3", "1,x", "-1,1", "1,0", "101", "nan"})
+  EXPECT_EQ((PixelInterval{0, 3, 16}).text(), "0,3,16");
+  EXPECT_EQ(PixelInterval::read("0.5,3,16"), (PixelInterval{0.5, 3, 16}));
+  for (const char* wrong : {"", "1,2,3,4", "1,2,-3", "1,x", "-1,1", "1,0", "101", "nan"})
     EXPECT_FALSE(PixelInterval::read(wrong)) << wrong;
+}
+
+// Two windows of two frames of 1x2 taxels with two channels, pictures of 2x4: the last frames count.
+TEST(PixelInterval, ALoadIsThatOfThePixelsTaxel) {
+  const NetworkFormat format{.frames = 2, .rows = 1, .columns = 2, .channels = 2, .scale = 2};
+  const std::vector<float> windows = {9, 9, 9, 9, 1, 3, 0, 0, 9, 9, 9, 9, 0, 0, 0, 5};
+  std::vector<float> errors(16, 0.5F);
+  add_load(2, format, windows, errors);
+  const std::vector<float> expected = {4.5F, 4.5F, 0.5F, 0.5F, 4.5F, 4.5F, 0.5F, 0.5F,
+                                       0.5F, 0.5F, 5.5F, 5.5F, 0.5F, 0.5F, 5.5F, 5.5F};
+  EXPECT_EQ(errors, expected);
 }
 
 // Errors of 0.1, 0.2 .. 1 where 0.1 was predicted: a factor of 9 covers nine of ten, and in a class a tenth
@@ -57,6 +70,8 @@ TEST(IntervalCoverage, FindsTheFactorThatHoldsEachHeight) {
   coverage.add(3, picture, 20, truth, predicted);
   EXPECT_DOUBLE_EQ(coverage.share(), 0.75);
   EXPECT_EQ(coverage.found(), (PixelInterval{0, 9}));
+  EXPECT_EQ(coverage.found(0.5), (PixelInterval{0, 5}));
+  EXPECT_NEAR(coverage.mean_half_width(9), 0.9, 1e-6);
   EXPECT_DOUBLE_EQ(coverage.of_height(0).share, 0.5);
   EXPECT_DOUBLE_EQ(coverage.of_height(3).share, 1);
   EXPECT_NEAR(coverage.of_height(3).half_width, 0.5, 1e-6);
