@@ -19,7 +19,6 @@
 #include "apps/stream/views/web_view.h"
 #include "data/map/elements.h"
 #include "data/map/map_file.h"
-#include "data/recordings/mcap_log.h"
 
 namespace supertac {
 
@@ -27,7 +26,6 @@ struct StreamSettings {
   double seconds = std::numeric_limits<double>::infinity();  ///< of signal, after which run() ends
   OutputPath out = "";  ///< file that keeps the pictures; "-": a line for each to stdout; empty: none
   Precision precision = Precision::fp32;
-  OutputPath mcap = "";              ///< MCAP file that keeps frames and pictures; empty: none
   std::string record = {};           ///< folder that gets a recording; empty: none
   std::string plate = "unknown";     ///< of the recording: a plate's name or an STL file
   OutputPath map = "";               ///< file of the surface that was felt; empty: none
@@ -93,7 +91,6 @@ class Stream {
   std::string record_path_, record_remark_;
   std::string about_lines_;
   std::unique_ptr<PictureLog> log_, record_;
-  std::unique_ptr<McapLog> mcap_;
   std::unique_ptr<TerminalView> view_;
   std::unique_ptr<PipeOutput> pipe_;
   std::unique_ptr<Recorder> recorder_;  // at the page's wish
