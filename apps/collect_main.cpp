@@ -70,25 +70,11 @@ std::string ask_operator() {
   return answer;
 }
 
-// As the rig's finger at the plate's edges: what hangs over feels nothing, which may be meant or not.
-std::string beside_the_plate(const RecorderSettings& settings) {
-  const PalpationPlan& plan = settings.bed.plan;
-  const TaxelArray& array = settings.sensor.array;
-  const double width = (array.columns - 1) * array.pitch_mm.x;
-  const double first = plan.start.x - settings.bed.limits.plate.x;
-  const double last = first + plan.shift_x * (plan.passes - 1);
-  const double over =
-      std::max(-std::min(first, last), std::max(first, last) - rig::kPlateWidthMm) + width / 2;
-  if (over <= 0) return "";
-  return "; of the array's " + format(width, 1) + " mm in x up to " + format(over, 1) +
-         " mm hang beside the plate of " + format(rig::kPlateWidthMm, 0) + " mm";
-}
-
 void confirm(const Arguments& arguments, const RecorderSettings& settings) {
   const PalpationPlan& plan = settings.bed.plan;
   arguments.note("plan: " + std::to_string(plan.passes) + " passes of " + format(plan.slide, 0) + " mm at " +
                  format(plan.speed, 1) + " mm/s from " + describe(plan.start) + ", lift " +
-                 format(plan.lift, 0) + " mm" + beside_the_plate(settings));
+                 format(plan.lift, 0) + " mm");
   if (arguments.flag("yes")) return;
   if (isatty(STDIN_FILENO) == 0) throw UsageError("--yes: needed where nobody can be asked");
   std::cerr << (settings.home ? "Is the bed free, so that the printer can home?"

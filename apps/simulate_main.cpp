@@ -160,18 +160,6 @@ void declare(Arguments& arguments) {
       .option("seed", "N", "the same seed gives the same files", "1");
 }
 
-namespace {
-
-std::size_t recordings_in(const std::string& folder) {
-  std::size_t count = 0;
-  if (!std::filesystem::is_directory(folder)) return count;
-  for (const auto& entry : std::filesystem::directory_iterator(folder))
-    count += entry.path().extension() == ".safetensors";
-  return count;
-}
-
-}  // namespace
-
 // What the touches of --fit tell of the sensor, which its file then says.
 Sensor fitted(const Arguments& arguments, const Sensor& sensor) {
   const std::string path = arguments.text("sensor"), given = arguments.text("fit");
@@ -197,7 +185,6 @@ int run(Arguments& arguments) {
   const auto settings = read_settings(arguments, sensor);
   const std::uint64_t seed = arguments.seed();
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
-  const std::size_t before = recordings_in(arguments.text("out"));
   OutputFolder folder(arguments.output("out"));
   const bool presses = arguments.given("presses");
   const auto jobs =
@@ -217,9 +204,6 @@ int run(Arguments& arguments) {
                         {"frames", frames},
                         {"seed", seed},
                         {"command", arguments.command_line()}});
-  if (before > 0)
-    arguments.note(arguments.text("out") + " held " + std::to_string(before) +
-                   " recordings before; those of other names stay and belong to the data set now");
   arguments.print(std::to_string(jobs.size()) + " recordings, " + std::to_string(frames) + " frames in " +
                   arguments.text("out"));
   return kExitOk;

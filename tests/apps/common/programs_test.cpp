@@ -37,6 +37,7 @@ std::string small_simulation(const std::string& out) {
 
 using Dispatcher = ProgramTest;
 using Export = ProgramTest;
+using Help = ProgramTest;
 using Import = ProgramTest;
 using Info = ProgramTest;
 using Output = ProgramTest;
@@ -177,9 +178,15 @@ TEST_F(Dispatcher, HelpIsThatOfTheJobOrTheGlossary) {
   EXPECT_TRUE(contains(run("supertac --help").out, "supertac help glossary"));
 }
 
-TEST_F(Simulate, SaysThatAFolderHasRecordingsAlready) {
-  succeed(small_simulation("sim"));
-  EXPECT_TRUE(contains(run(small_simulation("sim") + "--plates bumps6").error, "held 2 recordings before"));
+TEST_F(Help, BreaksNoWords) {
+  // Words of the help as declared; a line that ends within one would leave a part of it.
+  const std::string help = run("supertac-train --help").out;
+  for (const char* word :
+       {"multiply-adds", "safetensors", "recordings", "overwritten", "interrupted", "learning"}) {
+    const std::string text(word);
+    for (std::size_t cut = 4; cut + 3 < text.size(); ++cut)
+      EXPECT_FALSE(contains(help, text.substr(0, cut) + "\n")) << text;
+  }
 }
 
 TEST_F(Dispatcher, EveryProgramOfTheListIsThereAndSaysWhatItIsFor) {

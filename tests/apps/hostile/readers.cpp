@@ -1,15 +1,10 @@
 #include "tests/apps/hostile/readers.h"
 
-#include <cstring>
 #include <fstream>
 #include <functional>
 #include <iostream>
-#include <memory>
-#include <optional>
 #include <vector>
 
-#include "apps/web/pages.h"
-#include "apps/web/web_server.h"
 #include "data/frames/frame_decoder.h"
 #include "data/plates/plate.h"
 #include "data/plates/plate_mesh.h"
@@ -26,7 +21,6 @@
 #include "io/numbers/clock.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
-#include "tests/apps/web/http_client.h"
 #include "tests/fuzz/journal_properties.h"
 #include "tests/fuzz/stl_properties.h"
 
@@ -131,30 +125,6 @@ void judge_reading(const std::string& what, const std::function<void()>& read,
 
 namespace {
 
-/// The live page's server, asked with bytes; it must go on answering.
-class AskedServer {
- public:
-  void ask(const Bytes& bytes) {
-    HttpClient client(port_);
-    client.send(text_of(bytes));
-    if (++asked_ % 1000 == 0 && status_of(port_, good()) != 200)
-      throw std::logic_error("the server answers no more");
-  }
-  std::string good() const {
-    return "GET / HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port_) + "\r\n\r\n";
-  }
-
- private:
-  WebServer server_{{.port = 0},
-                    {.page = live_page(),
-                     .hello = [] { return std::string("{}"); },
-                     .news = [] { return std::string(); },
-                     .actions = {},
-                     .file = [](const std::string&) { return std::optional<std::string>(); }}};
-  int port_ = std::stoi(server_.url().substr(std::strlen("http://127.0.0.1:")));
-  std::uint64_t asked_ = 0;
-};
-
 std::vector<Reader> readers(const std::string& folder) {
   const std::string file = folder + "/mutant";
   std::string lines;
@@ -169,7 +139,6 @@ std::vector<Reader> readers(const std::string& folder) {
       read(file);
     };
   };
-  const auto server = std::make_shared<AskedServer>();
   Bytes frames(4 * rig::kFrameBytes);
   for (int i = 0; i < 4; ++i)
     write_frame({}, std::span(frames).subspan(i * rig::kFrameBytes).first<rig::kFrameBytes>());
@@ -213,8 +182,7 @@ std::vector<Reader> readers(const std::string& folder) {
          }
        })},
       {"pairs", good_pairs(folder),
-       from_file([](const std::string& f) { (void)import_pairs(SafetensorsFile::read(f)); })},
-      {"requests", bytes_of(server->good()), [server](const Bytes& b) { server->ask(b); }}};
+       from_file([](const std::string& f) { (void)import_pairs(SafetensorsFile::read(f)); })}};
 }
 
 Bytes mutant_of(const Bytes& good, const RandomStream& random) {

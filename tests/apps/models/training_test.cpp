@@ -43,11 +43,6 @@ TEST_F(Training, AWarningOfCollapseSaysThatItOftenMendsItself) {
   EXPECT_TRUE(contains(result.error, "early in a run it often mends itself: watch SSIM"));
 }
 
-TEST_F(Training, NamesThePlatesThereAre) {
-  expect_exit(train("none.safetensors", "--plates 6_Bump"), 1,
-              "plate '6_Bump' has no recording in data; it has those of ");
-}
-
 TEST_F(Training, EvaluationWarnsOfSignalsThroughAnotherFilter) {
   trained("filtered.safetensors", "--epochs 1");
   succeed("supertac-simulate --out raw --plates 3_Bumps --speeds 10 --passes 1 --sensor rig");
@@ -134,13 +129,6 @@ TEST_F(Training, LikeRepeatsATrainingToTheSameContent) {
             content_hash(SafetensorsFile::read(path("other.safetensors"))));
   expect_exit(run(like + "no.safetensors --preset tiny"), 2,
               "expected --preset NAME or --recipe-of MODEL, found both");
-}
-
-TEST_F(Training, DataThatTeachNothingAreRemarkedOn) {
-  succeed("supertac-simulate --out plain --plates plain --speeds 10 --passes 1");
-  const std::string remark = "every truth is 0 everywhere: nothing can be learnt";
-  EXPECT_TRUE(
-      contains(trained("nothing.safetensors", "--data plain --epochs 1").error, "warning: " + remark));
 }
 
 TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {

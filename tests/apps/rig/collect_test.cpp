@@ -214,15 +214,6 @@ TEST(CollectProgram, TheBarOfAFaultlessRigCountsNoDroppedPicturesAsLost) {
   std::erase(words, "--quiet");
   const ProcessResult result = run_process("supertac-collect", words, {.terminal = true});
   ASSERT_EQ(result.code, 0) << result.error;
-  // All moves together take 11.8 s.
-  const std::string estimate = "collecting: about ";
-  const std::size_t said = result.error.find(estimate);
-  if (said != std::string::npos) {
-    EXPECT_LE(std::stoi(result.error.substr(said + estimate.size())), 10) << result.error;
-  }
-  EXPECT_TRUE(
-      contains(result.error, "; of the array's 9.0 mm in x up to 4.0 mm hang beside the plate of 36 mm"))
-      << result.error;
   const std::size_t end = result.error.rfind(" lost");
   ASSERT_NE(end, std::string::npos) << result.error;
   const std::size_t begin = result.error.rfind(' ', end - 1) + 1;

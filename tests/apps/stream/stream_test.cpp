@@ -46,35 +46,6 @@ TEST_F(Streaming, AReplayGivesThePicturesThatLiveHad) {
   }
 }
 
-TEST_F(Streaming, ARecordingGivesThePicturesOfItsWindows) {
-  const Recording recording = record(40);
-  const ProcessResult done = stream("--recording recording --out out");
-  ASSERT_EQ(done.code, 0) << done.error;
-  const std::vector<float> pictures = kept("out").f32("pictures");
-  const std::vector<double> times = kept("out").f64("time_s");
-
-  WindowSettings settings;
-  settings.timesteps = kTimesteps, settings.scale = 2;
-  WindowSet windows(settings);
-  Recording sliding = recording;
-  sliding.lift_mm.clear();  // or frames between air and plate would end no window
-  windows.add(sliding);
-  const ModelFile file = load_model(model());
-  Tensor window(Shape{1, kTimesteps, kTaxels});
-  std::size_t compared = 0;
-  for (std::size_t i = 0, at = 0; i < windows.size(); ++i) {
-    const double time = static_cast<double>(windows.frame_of(i)) / 300;
-    while (at < times.size() && times[at] < time - 1e-9) ++at;
-    if (at == times.size() || times[at] > time + 1e-9) continue;  // a lost frame has no picture
-    windows.window(i, window.values());
-    const Tensor picture = CompiledModel(*file.model).estimate(window).picture;
-    ASSERT_TRUE(std::equal(picture.data(), picture.data() + 64, &pictures[at * 64])) << "window " << i;
-    ++compared;
-  }
-  EXPECT_EQ(compared, times.size());
-  EXPECT_GT(compared, recording.frames() - 2 * kTimesteps);
-}
-
 TEST_F(Streaming, TheMapOfARecordingHasTheBitsOfTheWindowsMap) {
   constexpr double kDelayS = 0.02;  // each picture is of the place where the finger was then
   const Recording recording = record(40);
