@@ -163,12 +163,19 @@ def elements(study):
                           "ssim": found["map"][of]["ssim"], "stated_ssim": drawn["map"][of]["ssim"],
                           **found["map"][of]["elements"]})
 
+    def left_out(plate):
+        return "--split", "texture", "--leave-out", plate, "--plates", ",".join(KNOWN)
+
     for plate in KNOWN:
         for seed in study.seeds:
             score("paper", seed, study.trained_apart(f"apart_s{seed}", KNOWN, seed), plate, 2)
+            score("paper, 0.6 s later", seed, study.trained_apart(f"late_s{seed}", KNOWN, seed, "--delay", "0.6"), plate, 2)
+            late = study.train(f"late_beside_without_{plate}_s{seed}", study.first, *FEWER, "--delay", "0.6", "--seed", seed,
+                               *left_out(plate))
+            for trial in (1, 2):
+                score("random plates beside, 0.6 s later", seed, late, plate, trial)
         model = study.trained_apart(f"apart_without_{plate}", [p for p in KNOWN if p != plate], 0)
-        beside = study.train(f"beside_without_{plate}", study.first, *FEWER, "--split", "texture", "--leave-out", plate,
-                             "--plates", ",".join(KNOWN))
+        beside = study.train(f"beside_without_{plate}", study.first, *FEWER, *left_out(plate))
         for trial in (1, 2):
             score("without the plate", 0, model, plate, trial)
             score("random plates beside", 0, beside, plate, trial)

@@ -266,6 +266,8 @@ std::string header_of(const ModelFile& file, const IntegerPlan& plan, std::size_
          define("UPPER_TIMESTEPS", text(f.frames), "samples of a window") +
          define("UPPER_HEIGHT", text(f.rows * f.scale), "of the picture, in pixels") +
          define("UPPER_WIDTH", text(f.columns * f.scale)) +
+         define("UPPER_DELAY_S", number(file.input.delay_s),
+                "a picture shows where the finger was so long before the newest frame") +
          define("UPPER_SENSOR_HZ", number(sensor_hz), "frames a second that it is made for") +
          define("UPPER_WORK_BYTES", text(plan.work_area),
                 "of RAM for the network; its window takes 4 bytes a value") +

@@ -24,10 +24,14 @@ float steepest(std::span<const float> picture, std::size_t width, std::size_t pi
 void PixelInterval::half_widths(std::span<const float> picture, std::int64_t width,
                                 std::span<const float> predicted_error, std::vector<float>& widths) const {
   widths.resize(predicted_error.size());
-  const auto along = static_cast<float>(shift), beside = static_cast<float>(factor);
   for (std::size_t i = 0; i < widths.size(); ++i)
-    widths[i] =
-        along * steepest(picture, static_cast<std::size_t>(width), i) + beside * at_least(predicted_error[i]);
+    widths[i] = std::min(reach(picture, width, i, predicted_error[i]), 1.0F);  // NaN stays
+}
+
+float PixelInterval::reach(std::span<const float> picture, std::int64_t width, std::size_t pixel,
+                           float predicted_error) const {
+  return static_cast<float>(shift) * steepest(picture, static_cast<std::size_t>(width), pixel) +
+         static_cast<float>(factor) * at_least(predicted_error);
 }
 
 std::string PixelInterval::text() const {
@@ -65,19 +69,19 @@ void add_load(double load, const NetworkFormat& format, std::span<const float> i
 void IntervalCoverage::add(std::size_t pass, std::span<const float> picture, std::int64_t width,
                            std::span<const float> truth, std::span<const float> predicted_error) {
   if (passes_.empty() || passes_.back().number != pass) passes_.push_back({.number = pass});
-  judged_.half_widths(picture, width, predicted_error, widths_);
   for (std::size_t i = 0; i < picture.size(); ++i) {
     const auto height = static_cast<std::size_t>(
         std::ranges::count_if(kEdges, [t = std::abs(truth[i])](float edge) { return t > edge; }));
     Height& counts = passes_.back().heights[height];
-    const double error = std::abs(double{picture[i]} - double{truth[i]}), half_width = double{widths_[i]},
+    const double error = std::abs(double{picture[i]} - double{truth[i]}),
+                 reach = double{judged_.reach(picture, width, i, predicted_error[i])},
                  predicted = double{at_least(predicted_error[i])};
-    const double ratio = (error - half_width) / predicted + judged_.factor;
+    const double ratio = (error - reach) / predicted + judged_.factor;
     const double bin = std::max(0.0, std::ceil(ratio * kBinsPerUnit - 1e-6) - 1);
     if (bin < double{kBins}) ++counts.ratios[static_cast<std::size_t>(bin)];
     ++counts.pixels;
-    counts.within += error <= half_width ? 1 : 0;
-    counts.half_width += half_width, counts.predicted += predicted;
+    counts.within += error <= std::min(reach, 1.0) ? 1 : 0;
+    counts.half_width += std::min(reach, 1.0);
   }
 }
 
@@ -102,13 +106,10 @@ IntervalCoverage::Held IntervalCoverage::of_height(std::size_t height) const {
   return {held.share / held.pixels, held.half_width / held.pixels, held.pixels};
 }
 
-double IntervalCoverage::mean_half_width(double factor) const {
+double IntervalCoverage::half_width() const {
   double sum = 0, pixels = 0;
   for (const Pass& pass : passes_)
-    for (const Height& h : pass.heights) {
-      sum += h.half_width + (factor - judged_.factor) * h.predicted;
-      pixels += static_cast<double>(h.pixels);
-    }
+    for (const Height& h : pass.heights) sum += h.half_width, pixels += static_cast<double>(h.pixels);
   return sum / pixels;
 }
 

@@ -20,7 +20,7 @@ inline float at_least(float predicted_error) { return std::max(predicted_error, 
 
 /// The interval that holds the truth of nine pixels in ten, v +- w. A picture may stand a little beside the
 /// surface, and be wrong besides; a network can predict the latter only:
-///   w = shift max |v' - v| + factor at_least(predicted error),    v': the eight pixels around
+///   w = shift max |v' - v| + factor at_least(predicted error), 1 at most,    v': the eight pixels around
 /// the first term being, to first order, what a picture `shift` pixels off changes. A predicted error is the
 /// network's and, where `load` is not 0, what add_load() adds.
 struct PixelInterval {
@@ -34,6 +34,9 @@ struct PixelInterval {
   /// neighbours.
   void half_widths(std::span<const float> picture, std::int64_t width, std::span<const float> predicted_error,
                    std::vector<float>& widths) const;
+  /// The same of one pixel, and without a most.
+  float reach(std::span<const float> picture, std::int64_t width, std::size_t pixel,
+              float predicted_error) const;
 
   /// "0.75,0.55", with a load "0.75,0.55,16", or "1.45" for a factor without a shift, as older files have it;
   /// back from it, or nothing for another text, a shift outside 0 to 10, a factor outside 0.05 to 100 or a
@@ -75,7 +78,7 @@ class IntervalCoverage {
   /// none does (Mondrian conformal prediction with the largest class for all; Vovk, Gammerman, Shafer 2005,
   /// ch. 4.5).
   PixelInterval found(double share = kCovered) const;
-  double mean_half_width(double factor) const;  ///< of all pixels, were this the factor
+  double half_width() const;  ///< mean over all pixels
 
  private:
   static constexpr std::size_t kBins = 400;  // of (|error| - shift term) / predicted error below 20
@@ -83,7 +86,7 @@ class IntervalCoverage {
   struct Height {
     std::array<std::uint32_t, kBins> ratios{};
     std::uint64_t pixels = 0, within = 0;
-    double half_width = 0, predicted = 0;
+    double half_width = 0;
   };
   struct Pass {
     std::size_t number;
@@ -92,7 +95,6 @@ class IntervalCoverage {
 
   PixelInterval judged_;
   std::vector<Pass> passes_;
-  std::vector<float> widths_;
 };
 
 }  // namespace supertac

@@ -120,22 +120,21 @@ std::map<std::string, std::string> trained_origin(const Trainer& trainer, const 
   if (!task.finds_interval_factor || !trainer.model().settings().predicted_error) return origin;
   const std::vector<std::uint32_t> tested = evenly_spaced(task.split.test, kTestedPerEpoch);
   const double most = static_cast<double>(task.windows->scale()) * static_cast<double>(task.windows->scale());
-  std::optional<PixelInterval> least;
-  double least_width = 0;
-  for (const double load : {0.0, most}) {
-    IntervalCoverage coverage(PixelInterval{.load = load});
-    for_each_output(Ensemble({CompiledModel(trainer.model())}, load), *task.windows, tested,
+  const auto judged = [&](const PixelInterval& interval) {
+    IntervalCoverage coverage(interval);
+    for_each_output(Ensemble({CompiledModel(trainer.model())}, interval.load), *task.windows, tested,
                     [&](const EvaluatedBatch& b) {
                       for (std::size_t n = 0; n < b.size(); ++n)
                         coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n),
                                      task.windows->image().width, b.target(n), b.predicted_error(n));
                       return true;
                     });
-    const PixelInterval found = coverage.found(kHeldOnFoundGroups);
-    const double width = coverage.mean_half_width(found.factor);
-    if (!least || width < least_width) least = found, least_width = width;
-  }
-  origin["interval_factor"] = least->text();
+    return coverage;
+  };
+  const PixelInterval plain = judged({}).found(kHeldOnFoundGroups),
+                      loaded = judged({.load = most}).found(kHeldOnFoundGroups);
+  origin["interval_factor"] =
+      (judged(loaded).half_width() < judged(plain).half_width() ? loaded : plain).text();
   origin["interval_factor_found"] = "tested groups";
   return origin;
 }

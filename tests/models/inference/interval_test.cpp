@@ -23,6 +23,8 @@ TEST(PixelInterval, GrowsWithTheSlopeAndThePredictedError) {
   for (std::size_t i = 0; i < 12; ++i) EXPECT_FLOAT_EQ(widths[i], expected[i]) << i;
   PixelInterval{0, 5}.half_widths(picture, 4, std::vector<float>(12, -3.0F), widths);
   EXPECT_FLOAT_EQ(widths[6], 0.05F) << "no predicted error is below .01";
+  PixelInterval{0, 50}.half_widths(picture, 4, errors, widths);
+  EXPECT_FLOAT_EQ(widths[6], 1) << "truths lie in 0 to 1";
   PixelInterval{}.half_widths(picture, 4, {}, widths);
   EXPECT_TRUE(widths.empty());
 }
@@ -71,7 +73,7 @@ TEST(IntervalCoverage, FindsTheFactorThatHoldsEachHeight) {
   EXPECT_DOUBLE_EQ(coverage.share(), 0.75);
   EXPECT_EQ(coverage.found(), (PixelInterval{0, 9}));
   EXPECT_EQ(coverage.found(0.5), (PixelInterval{0, 5}));
-  EXPECT_NEAR(coverage.mean_half_width(9), 0.9, 1e-6);
+  EXPECT_NEAR(coverage.half_width(), 0.5, 1e-6);
   EXPECT_DOUBLE_EQ(coverage.of_height(0).share, 0.5);
   EXPECT_DOUBLE_EQ(coverage.of_height(3).share, 1);
   EXPECT_NEAR(coverage.of_height(3).half_width, 0.5, 1e-6);
