@@ -25,8 +25,7 @@ void declare(Arguments& a) {
       "training FILE --data DIR: repeats "
       "parts of a training that kept a ledger; step FILE --data DIR --step N: opens one step of it, with "
       "every "
-      "operator; ledgers FILE OTHER: the first difference of two, or of two steps that were opened with "
-      "--json");
+      "operator");
   a.positional("FILE", "what is checked", false);
   a.positional("OTHER", "what it is compared with", false);
   a.option("data", "DIR", "training, step, chain: the recordings that the model was trained on");
@@ -74,8 +73,8 @@ void need(const Arguments& a, const std::string& name) {
 }  // namespace
 
 int run(Arguments& a) {
-  const std::string what = a.choice(
-      "WHAT", {"gradients", "bits", "machine", "udev", "file", "chain", "training", "step", "ledgers"});
+  const std::string what =
+      a.choice("WHAT", {"gradients", "bits", "machine", "udev", "file", "chain", "training", "step"});
   for (const auto& [option, of] : kOptionsOf)
     if (a.given(option) && std::ranges::find(of, what) == of.end())
       throw UsageError(std::string("--") + option + ": nothing that " + what + " reads; leave it out");
@@ -85,9 +84,8 @@ int run(Arguments& a) {
   if (what == "udev") return print_udev_rule(a);
   need(a, "FILE");
   if (what == "file") return check_file(a);
-  need(a, what == "ledgers" || what == "chain" ? "OTHER" : "data");
+  need(a, what == "chain" ? "OTHER" : "data");
   if (what == "chain") return check_chain(a);
-  if (what == "ledgers") return check_ledgers(a);
   if (what == "training") return check_training(a);
   need(a, "step");
   return check_step(a);

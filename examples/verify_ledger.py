@@ -1,7 +1,10 @@
 #!/usr/bin/env python3
-"""Checks a training's ledger by docs/audit.md alone: the chain of its lines, and every kept state's hashes.
+"""Checks a training's ledger by docs/audit.md alone: the chain of its lines, and every kept state's hashes. Of two
+ledgers, or of two steps that supertac-check opened with --json, it names the first difference instead.
 
     examples/verify_ledger.py MODEL.run      needs NumPy
+    examples/verify_ledger.py ONE.run/ledger.jsonl OTHER.run/ledger.jsonl
+    examples/verify_ledger.py one.json other.json
 """
 import hashlib
 import json
@@ -13,6 +16,34 @@ import sys
 if sys.argv[1:] in ([], ["-h"], ["--help"]):
     print(__doc__)
     sys.exit(0 if sys.argv[1:] else 2)
+
+
+
+def rows(path):
+    """What can differ: the arrays of each line of a ledger, or what went into each operator and came out of it."""
+    with open(path, encoding="utf-8") as file:
+        if path.endswith(".json"):
+            return [(ran["name"], {**{f"input {i}": x for i, x in enumerate(ran.get("inputs", []))},
+                                   "the settings": ran.get("settings"),
+                                   **{f"output {i}": x for i, x in enumerate(ran["outputs"])}})
+                    for ran in json.load(file)["operators"]]
+        names = json.loads(file.readline())["tensors"]
+        lines = map(json.loads, file)
+        return [(f"step {line['step']}", dict(zip(names, line["tensors"]), **{"the batches": line["batches"]}))
+                for line in lines]
+
+
+if len(sys.argv) == 3:
+    one, other = (rows(path) for path in sys.argv[1:])
+    for (name, mine), (its_name, its) in zip(one, other):
+        if name != its_name or mine.keys() != its.keys():
+            sys.exit(f"{sys.argv[1]}, {sys.argv[2]}: expected two of the same network and recipe, found {name} and "
+                     f"{its_name}")
+        for what in mine:
+            if mine[what] != its[what]:
+                sys.exit(f"{name}, {what}: {mine[what]} and {its[what]}")
+    print(f"the same in {min(len(one), len(other))} of {len(one)} and {len(other)} rows")
+    sys.exit(0)
 
 try:
     import numpy as np

@@ -30,8 +30,4 @@ int check_training(const Arguments& a);
 /// (models/training/audit/opened_step.h).
 int check_step(const Arguments& a);
 
-/// `supertac-check ledgers`: the first step and array in which two ledgers differ, or the first operator in
-/// which two opened steps do.
-int check_ledgers(const Arguments& a);
-
 }  // namespace supertac

@@ -1,18 +1,137 @@
-#include "apps/check/check.h"
-
+// A training with a ledger, made again from the states that it kept: pieces of it, or one step, opened.
 #include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <optional>
 
-#include "apps/check/repetition.h"
+#include "apps/check/check.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
+#include "apps/train/ledger_file.h"
+#include "apps/train/run_folder.h"
+#include "apps/train/training_options.h"
+#include "data/recordings/recording.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "io/files/provenance.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
+#include "models/training/audit/opened_step.h"
 
 namespace supertac {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+/// A training with a ledger, made again from the states that it kept.
+class Repetition {
+ public:
+  /// Of the model's run folder, as its file says that it was trained. Throws FileError when that does not say
+  /// it, when there is no ledger, or when --data holds other recordings.
+  Repetition(const Arguments& a, const std::string& model);
+
+  struct Segment {
+    std::int64_t from, to;
+  };
+  /// From kept state to kept state. Throws FileError when one is missing.
+  std::vector<Segment> segments() const;
+
+  /// Goes to the last kept state at or before `step`; what it returns is how the state differs from its line.
+  std::optional<LedgerDifference> start(std::int64_t step);
+  /// Makes a step, by `make` where it is given, and compares with the ledger where that has a line.
+  std::optional<LedgerDifference> make_step(const std::function<void()>& make = {});
+  /// The line that the last step gave, if any.
+  const std::optional<LedgerLine>& line() const { return line_; }
+
+  Trainer& trainer() { return *trainer_; }
+
+ private:
+  std::string folder_;
+  Ledger ledger_;
+  TrainingTask task_;
+  std::optional<Trainer> trainer_;
+  std::optional<LedgerWriter> writer_;
+  std::optional<LedgerLine> line_;
+};
+
+void check_recordings(const Arguments& a, const Recipe& recipe, const std::string& path) {
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  const auto provenance = file.metadata().find(kProvenanceKey);
+  if (provenance == file.metadata().end())
+    throw FileError(path, "does not say how it was made; train it with this version to have it checked");
+  const std::string found = hash_of_recordings(a.text("data"), recipe.plates);
+  const std::string expected = parse_json_limited(provenance->second).at("parents").value("recordings", "");
+  if (found != expected)
+    throw FileError(a.text("data"), "holds other recordings than " + path +
+                                        " was trained on: expected content " + expected + ", found " + found);
+}
+
+TrainingTask task_of(const Arguments& a, const std::string& path) {
+  const Recipe recipe = Recipe::of(load_model(path), path);
+  check_recordings(a, recipe, path);
+  return window_task(recipe, folders_of(a));
+}
+
+Repetition::Repetition(const Arguments& a, const std::string& model)
+    : folder_(RunFolder::folder_of(model)),
+      ledger_(Ledger::read(LedgerFile::path_in(folder_))),
+      task_(task_of(a, model)) {
+  trainer_.emplace(*task_.windows, task_.split.train, std::move(task_.objective));
+}
+
+std::vector<Repetition::Segment> Repetition::segments() const {
+  const std::int64_t total = trainer_->total_steps(), apart = LedgerFile::apart(ledger_.every, total);
+  std::vector<Segment> segments;
+  for (std::int64_t from = 0; from < total; from += apart) {
+    if (!std::filesystem::exists(LedgerFile::state_path(folder_, from)))
+      throw FileError(LedgerFile::state_path(folder_, from), "is missing; the ledger says that it was kept");
+    segments.push_back({from, std::min(from + apart, total)});
+  }
+  return segments;
+}
+
+std::optional<LedgerDifference> Repetition::start(std::int64_t step) {
+  const std::int64_t total = trainer_->total_steps(), apart = LedgerFile::apart(ledger_.every, total);
+  const std::int64_t kept = step == total ? total : step / apart * apart;
+  trainer_->restore(LedgerFile::state_path(folder_, kept), task_.origin);
+  const std::optional<LedgerLine> line = ledger_.at(kept);
+  writer_.emplace(*trainer_, ledger_.every, line ? &*line : nullptr);
+  line_.reset();
+  if (!line) return std::nullopt;  // the beginning, which follows from the seed
+  LedgerLine mine = *line;
+  mine.tensors = hashes_of(*trainer_);
+  return difference(ledger_, *line, mine);
+}
+
+std::optional<LedgerDifference> Repetition::make_step(const std::function<void()>& make) {
+  stop_if_interrupted();
+  const std::int64_t before = trainer_->step();
+  if (make) {
+    make();
+  } else {
+    trainer_->train_step();
+  }
+  line_ = writer_->after_step();
+  if (!line_) return std::nullopt;
+  const std::optional<LedgerLine> theirs = ledger_.at(line_->step);
+  if (!theirs) return LedgerDifference{before, line_->step, "a line that is missing", false};
+  return difference(ledger_, *theirs, *line_);
+}
+
+std::string text_of(const LedgerDifference& d) {
+  const std::string where =
+      d.step - d.after > 1 ? "between steps " + std::to_string(d.after + 1) + " and " + std::to_string(d.step)
+                           : "at step " + std::to_string(d.step);
+  return "differs " + where + ": " + d.what +
+         (d.batches && d.what != "the batches" ? ", and the batches" : "");
+}
+
+Json to_json(const LedgerDifference& d) {
+  return {{"after", d.after}, {"step", d.step}, {"tensor", d.what}, {"batches", d.batches}};
+}
+
 using Segment = Repetition::Segment;
 
 // Those to be repeated, drawn without looking at them, in their order.
@@ -77,6 +196,75 @@ int check_training(const Arguments& a) {
   a.write_json(
       {{"segments", all.size()}, {"repeated", chosen.size()}, {"differences", wrong}, {"rows", rows}});
   return wrong == 0 ? kExitOk : kExitFailed;
+}
+
+namespace {
+
+// The arrays under their hashes, and what the operators are that they belong to.
+void write_arrays(const OutputPath& out, const std::map<std::string, Tensor>& arrays, const Json& operators) {
+  std::vector<TensorToWrite> tensors;
+  for (const auto& [hash, values] : arrays) {
+    std::vector<std::uint64_t> shape;
+    for (const Dim d : values.shape().dims()) shape.push_back(static_cast<std::uint64_t>(d));
+    tensors.push_back({hash, "F32", shape, std::as_bytes(values.values())});
+  }
+  write_safetensors(out, {{"kind", "operators"}, {"operators", operators.dump()}}, tensors);
+}
+
+Json whose_name_begins(const Json& operators, const std::string& name) {
+  Json some = Json::array();
+  for (const Json& ran : operators)
+    if (ran["name"].get<std::string>().starts_with(name)) some.push_back(ran);
+  return some;
+}
+
+// Repeats the training up to the step before this one.
+std::optional<LedgerDifference> go_before(Repetition& training, std::int64_t step, const Arguments& a) {
+  auto d = training.start(step - 1);
+  const std::int64_t from = training.trainer().step();
+  Progress progress(a, "repeating", static_cast<std::uint64_t>(step - from), "steps");
+  for (; !d && training.trainer().step() < step - 1;
+       progress.update(static_cast<std::uint64_t>(training.trainer().step() - from)))
+    d = training.make_step();
+  return d;
+}
+
+}  // namespace
+
+int check_step(const Arguments& a) {
+  if (a.given("out") != a.given("operator"))
+    throw UsageError("step: --operator says whose arrays --out holds; give both or neither");
+  const std::string model = a.text("FILE");
+  Repetition training(a, model);
+  Trainer& trainer = training.trainer();
+  const std::int64_t step = a.integer("step", 1, trainer.total_steps());
+  auto d = go_before(training, step, a);
+  OpenedStep opened;
+  if (!d) {
+    d = training.make_step([&] {
+      opened = open_step(trainer, a.given("operator") ? std::optional(a.text("operator")) : std::nullopt);
+    });
+  }
+  while (!d && !training.line()) d = training.make_step();  // up to the line that holds it
+  const Json kept =
+      a.given("operator") ? whose_name_begins(opened.operators, a.text("operator")) : Json::array();
+  if (a.given("operator") && kept.empty() && !d)
+    throw UsageError("--operator " + a.text("operator") +
+                     ": no operator of this step has a name that begins so; --json "
+                     "FILE lists them");
+  if (a.given("out") && opened.arrays.empty() && !d)
+    throw UsageError("--operator " + a.text("operator") + ": what begins so is computed from nothing");
+  if (a.given("out")) write_arrays(a.output("out"), opened.arrays, kept);
+  const LedgerLine line = training.line().value_or(LedgerLine());
+  a.print(
+      "step " + std::to_string(step) + ": " + std::to_string(opened.operators.size()) +
+      " operators; the ledger " +
+      (d ? text_of(*d) : "has the same line at step " + std::to_string(line.step) + ", chain " + line.chain));
+  a.write_json({{"step", step},
+                {"line", {{"step", line.step}, {"chain", line.chain}}},
+                {"difference", d ? to_json(*d) : Json()},
+                {"operators", opened.operators}});
+  return d ? kExitFailed : kExitOk;
 }
 
 }  // namespace supertac

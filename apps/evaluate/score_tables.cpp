@@ -68,7 +68,7 @@ std::array<Interval, 2> PassScores::intervals() const {
   }
   // Groups of a pass each are drawn themselves: one pass drawn anew within its plate is always the same.
   if (names.size() == passes_.size()) std::ranges::fill(plates, 0);
-  return {bootstrap_interval({&ssims, 1}, plates), bootstrap_interval({&psnrs, 1}, plates)};
+  return {bootstrap_interval(ssims, plates), bootstrap_interval(psnrs, plates)};
 }
 
 std::string PassScores::interval_text() const {

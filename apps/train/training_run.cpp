@@ -1,14 +1,45 @@
 #include "apps/train/training_run.h"
 
+#include <optional>
+#include <string>
 #include <utility>
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
+#include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
+#include "apps/train/ledger_file.h"
+#include "apps/train/run_folder.h"
+#include "apps/train/training_options.h"
+#include "data/recordings/recording.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {
+
+class TrainingRun {
+ public:
+  TrainingRun(const Arguments& a, TrainingTask task, Ranks& ranks);
+  /// Until the last step or a signal. The state is saved either way; after the last step report and model are
+  /// written too. Returns the exit code.
+  int train();
+
+ private:
+  TrainingCallbacks callbacks(Progress& progress);
+  void write_end();
+  std::string detail(const StepReport& report) const;
+  void warn_of_collapse(const StepReport& report);
+
+  const Arguments& a_;
+  TrainingTask task_;
+  OutputPath out_;
+  Trainer trainer_;
+  std::optional<RunFolder> folder_;
+  std::optional<LedgerFile> ledger_;
+  nlohmann::ordered_json description_;
+  bool warned_ = false;
+  std::optional<double> loss_, test_ssim_;  // as last logged
+};
 
 void check_agreement(const Trainer& trainer, const TrainingTask& task, Ranks& ranks) {
   std::map<std::string, std::string> mine = task.origin;
@@ -24,10 +55,10 @@ void check_agreement(const Trainer& trainer, const TrainingTask& task, Ranks& ra
 }
 
 // Restored before the run folder is touched: a checkpoint that does not fit must leave the folder as it was.
-Trainer make_trainer(TrainingTask& task, const TrainingTarget& target) {
-  Trainer trainer(*task.windows, task.split.train, std::move(task.objective), target.ranks);
-  if (!target.resume.empty()) trainer.restore(target.resume, task.origin);
-  if (target.ranks.size() > 1) check_agreement(trainer, task, target.ranks);
+Trainer make_trainer(TrainingTask& task, const std::string& resume, Ranks& ranks) {
+  Trainer trainer(*task.windows, task.split.train, std::move(task.objective), ranks);
+  if (!resume.empty()) trainer.restore(resume, task.origin);
+  if (ranks.size() > 1) check_agreement(trainer, task, ranks);
   return trainer;
 }
 
@@ -49,36 +80,47 @@ nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, cons
           {"steps", trainer.total_steps()}};
 }
 
-}  // namespace
-
-TrainingRun::TrainingRun(const Arguments& a, TrainingTask task, TrainingTarget target)
+TrainingRun::TrainingRun(const Arguments& a, TrainingTask task, Ranks& ranks)
     : a_(a),
       task_(std::move(task)),
-      target_(std::move(target)),
-      trainer_(make_trainer(task_, target_)),
+      out_(a.output("out")),
+      trainer_(make_trainer(task_, a.text("resume"), ranks)),
       description_(describe(a, trainer_, task_)) {
-  if (a_.given("ledger") && target_.ranks.size() > 1)
+  if (a_.given("ledger") && ranks.size() > 1)
     throw UsageError("--ledger: of one process only; leave it out under mpirun");
-  if (!target_.ranks.first()) return;
-  folder_.emplace(target_.out.path, target_.force,
-                  target_.resume.empty() ? std::nullopt : std::optional(trainer_.step()));
+  if (!ranks.first()) return;
+  folder_.emplace(out_.path, a.force(), a.given("resume") ? std::optional(trainer_.step()) : std::nullopt);
   folder_->write_settings(description_);
   if (a_.given("ledger"))
     ledger_.emplace(folder_->path(), a_.integer("ledger", 1, 1'000'000'000), trainer_, task_.origin);
 }
 
-bool TrainingRun::train() {
+int TrainingRun::train() {
+  a_.note(task_.counts);
+  for (const std::string& one : task_.remarks) a_.note("warning: " + one);
   a_.note("training on " + std::to_string(task_.split.train.size()) + " windows, " +
           std::to_string(trainer_.total_steps()) + " steps" +
-          (target_.resume.empty() ? "" : ", resumed at " + std::to_string(trainer_.step())));
+          (a_.given("resume") ? ", resumed at " + std::to_string(trainer_.step()) : ""));
   for (const std::string& note : task_.notes) a_.note(note);
   {
     Progress progress(a_, "training", static_cast<std::uint64_t>(trainer_.total_steps()), "steps",
                       static_cast<std::uint64_t>(trainer_.step()));
     supertac::train(trainer_, task_, callbacks(progress));
   }
-  if (folder_) write_end();
-  return trainer_.done();
+  const int code = trainer_.done() ? kExitOk : kExitFailed;
+  if (!folder_) return code;
+  write_end();
+  if (!trainer_.done()) {
+    a_.note("stopped at step " + std::to_string(trainer_.step()) + " of " +
+            std::to_string(trainer_.total_steps()) + "; continue with the same options and --resume " +
+            folder_->checkpoint_path());
+    return code;
+  }
+  a_.print(out_.path + ": " + std::to_string(trainer_.model().parameter_count()) + " parameters after " +
+           std::to_string(trainer_.step()) + " steps; curves in " + folder_->path() + "/report.html");
+  description_["out"] = out_.path;
+  a_.write_json(description_);
+  return code;
 }
 
 // Report and settings with the time that it took, and the model.
@@ -96,8 +138,8 @@ void TrainingRun::write_end() {
               " is kept: it drew the group that was held out best (contact SSIM " +
               format(trainer_.best_score(), 3) + ")");
     save_trained(trainer_, finished, origin);
-    target_.out.path = publish(finished, target_.out);
-    description_["content"] = hash_of_file(target_.out.path);
+    out_.path = publish(finished, out_);
+    description_["content"] = hash_of_file(out_.path);
   }
   folder_->write_settings(description_);
   folder_->write_report();
@@ -141,6 +183,16 @@ void TrainingRun::warn_of_collapse(const StepReport& report) {
   a_.note("step " + std::to_string(report.step) + ": " + advice + "--learning-rate (now " +
           format(trainer_.objective().recipe().learning_rate) +
           "); early in a run it often mends itself: watch SSIM");
+}
+
+}  // namespace
+
+int train(const Arguments& a, Ranks& ranks) {
+  as_usage([&] { check_micro_batches(ranks.size(), 8); });
+  const Recipe recipe = recipe_of(a);
+  TrainingTask task = window_task(recipe, folders_of(a));
+  add_parent("recordings", hash_of_recordings(a.text("data"), recipe.plates));
+  return TrainingRun(a, std::move(task), ranks).train();
 }
 
 }  // namespace supertac

@@ -3,7 +3,6 @@
 //
 //   peers_ours MODEL WINDOWS          WINDOWS: safetensors with `windows` [N,T,16]
 //   pictures FILE                     infers all windows, writes `pictures` [N,S,S]    -> done
-//   cost                              -> multiply-adds of inference, of training, per window
 //   infer BATCH SECONDS               -> medians: processor and wall time of a call (s), FMA peak (GFLOP/s)
 //   train THREADS SECONDS [BATCH]     the same for a training step of 64 windows, or so many
 //   each COUNT FILE                   wall times of pictures one by one, `seconds` [COUNT]  -> page faults
@@ -26,7 +25,6 @@
 #include "io/numbers/numbers.h"
 #include "models/files/model_file.h"
 #include "models/inference/compiled/compiled_model.h"
-#include "models/networks/cost.h"
 #include "models/training/trainer.h"
 
 namespace supertac {
@@ -126,10 +124,6 @@ class Ours {
     double seconds = 0;
     words >> what;
     if (what == "pictures" && words >> file) return pictures(file);
-    if (what == "cost") {
-      const Cost cost = cost_of(model_->settings());
-      return format(cost.inference) + " " + format(cost.training);
-    }
     if (what == "infer" && words >> number >> seconds && number <= windows_.dim(0)) {
       omp_set_num_threads(1);
       const Tensor batch = first_windows(number);

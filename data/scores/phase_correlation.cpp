@@ -1,7 +1,6 @@
 #include "data/scores/phase_correlation.h"
 
 #include <kissfft/kiss_fft.h>
-#include <kissfft/kiss_fftr.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,14 +14,8 @@
 namespace supertac {
 namespace {
 
-static_assert(sizeof(kiss_fft_cpx) == 2 * sizeof(float), "kissfft must be its single-precision build");
-
-kiss_fft_cpx* complex(std::vector<float>& numbers, std::size_t at = 0) {
-  return reinterpret_cast<kiss_fft_cpx*>(&numbers[2 * at]);
-}
-const kiss_fft_cpx* complex(const std::vector<float>& numbers, std::size_t at = 0) {
-  return reinterpret_cast<const kiss_fft_cpx*>(&numbers[2 * at]);
-}
+static_assert(sizeof(kiss_fft_cpx) == sizeof(std::complex<float>),
+              "kissfft must be its single-precision build");
 
 std::vector<float> hann(int size) {
   std::vector<float> window;
@@ -41,54 +34,42 @@ double parabola_top(double before, double top, double after) {
 
 void PhaseCorrelator::Free::operator()(void* plan) const { std::free(plan); }
 
-// One axis after the other: kissfft's own plan for two axes asks for too little memory at most sizes and then
-// gives none.
 PhaseCorrelator::Plans::Plans(int height, int width, bool inverse) {
-  if (height < 4 || width < 4 || height % 2 != 0 || width % 2 != 0)
-    throw std::invalid_argument("phase correlation: sides must be even and at least 4, got " +
-                                std::to_string(height) + "x" + std::to_string(width));
-  along_rows.reset(kiss_fftr_alloc(width, inverse ? 1 : 0, nullptr, nullptr));
-  along_columns.reset(kiss_fft_alloc(height, inverse ? 1 : 0, nullptr, nullptr));
-  if (!along_rows || !along_columns) throw std::bad_alloc();
+  if (height < 4 || width < 4)
+    throw std::invalid_argument("phase correlation: sides must be at least 4, got " + std::to_string(height) +
+                                "x" + std::to_string(width));
+  of_rows.reset(kiss_fft_alloc(width, inverse ? 1 : 0, nullptr, nullptr));
+  of_columns.reset(kiss_fft_alloc(height, inverse ? 1 : 0, nullptr, nullptr));
+  if (!of_rows || !of_columns) throw std::bad_alloc();
 }
 
 PhaseCorrelator::PhaseCorrelator(int height, int width)
-    : height_(height), width_(width), forward_(height, width, false), inverse_(height, width, true) {
-  down_ = hann(height);
-  across_ = hann(width);
-  surface_.resize(down_.size() * across_.size());
-  const auto bins = static_cast<std::size_t>(height) * static_cast<std::size_t>(width / 2 + 1);
-  for (Spectrum* spectrum : {&a_, &b_, &cross_, &turned_}) spectrum->resize(2 * bins);
-  row_.resize(2 * bins / down_.size());
-  column_.resize(2 * down_.size());
+    : height_(height),
+      width_(width),
+      forward_(height, width, false),
+      inverse_(height, width, true),
+      down_(hann(height)),
+      across_(hann(width)),
+      surface_(down_.size() * across_.size()) {}
+
+// One axis after the other: kissfft's own plan for two axes asks for too little memory at most sizes and then
+// gives none.
+PhaseCorrelator::Spectrum PhaseCorrelator::transformed(const Spectrum& image, const Plans& plans) const {
+  const auto along = [](const Spectrum& from, std::size_t size, kiss_fft_state* plan) {
+    const std::size_t lines = from.size() / size;
+    Spectrum turned(from.size()), line(size);  // [size][lines]
+    for (std::size_t i = 0; i < lines; ++i) {
+      kiss_fft(plan, reinterpret_cast<const kiss_fft_cpx*>(&from[i * size]),
+               reinterpret_cast<kiss_fft_cpx*>(line.data()));
+      for (std::size_t k = 0; k < size; ++k) turned[k * lines + i] = line[k];
+    }
+    return turned;
+  };
+  return along(along(image, across_.size(), plans.of_rows.get()), down_.size(), plans.of_columns.get());
 }
 
-void PhaseCorrelator::to_spectrum(Spectrum& out) {
-  const std::size_t height = down_.size(), bins = row_.size() / 2;
-  for (std::size_t r = 0; r < height; ++r) {
-    kiss_fftr(forward_.along_rows.get(), &surface_[r * across_.size()], complex(row_));
-    for (std::size_t c = 0; c < bins; ++c) *complex(turned_, c * height + r) = *complex(row_, c);
-  }
-  for (std::size_t c = 0; c < bins; ++c) {
-    kiss_fft(forward_.along_columns.get(), complex(turned_, c * height), complex(column_));
-    for (std::size_t r = 0; r < height; ++r) *complex(out, r * bins + c) = *complex(column_, r);
-  }
-}
-
-void PhaseCorrelator::to_surface(const Spectrum& spectrum) {
-  const std::size_t height = down_.size(), bins = row_.size() / 2;
-  for (std::size_t c = 0; c < bins; ++c) {
-    for (std::size_t r = 0; r < height; ++r) *complex(column_, r) = *complex(spectrum, r * bins + c);
-    kiss_fft(inverse_.along_columns.get(), complex(column_), complex(turned_, c * height));
-  }
-  for (std::size_t r = 0; r < height; ++r) {
-    for (std::size_t c = 0; c < bins; ++c) *complex(row_, c) = *complex(turned_, c * height + r);
-    kiss_fftri(inverse_.along_rows.get(), complex(row_), &surface_[r * across_.size()]);
-  }
-}
-
-// False when the image is flat.
-bool PhaseCorrelator::transform(std::span<const float> image, Spectrum& out) {
+// Empty when the image is flat.
+PhaseCorrelator::Spectrum PhaseCorrelator::spectrum_of(std::span<const float> image) const {
   if (image.size() != surface_.size())
     throw std::invalid_argument("phase correlation: expects " + std::to_string(surface_.size()) +
                                 " pixels, got " + std::to_string(image.size()));
@@ -96,39 +77,38 @@ bool PhaseCorrelator::transform(std::span<const float> image, Spectrum& out) {
   for (const float v : image) mean += v;
   mean /= static_cast<double>(image.size());
   double deviation = 0;
+  Spectrum windowed(image.size());
   for (std::size_t i = 0; i < image.size(); ++i) {
     const double centred = image[i] - mean;
     deviation = std::max(deviation, std::abs(centred));
-    surface_[i] = static_cast<float>(centred) * down_[i / across_.size()] * across_[i % across_.size()];
+    windowed[i] = static_cast<float>(centred) * down_[i / across_.size()] * across_[i % across_.size()];
   }
-  to_spectrum(out);
-  return deviation > kFlat;
+  return deviation > kFlat ? transformed(windowed, forward_) : Spectrum();
 }
 
 // surface_ = IFFT2(R / (|R| + epsilon max|R|))
-void PhaseCorrelator::correlate(double epsilon) {
+void PhaseCorrelator::correlate(const Spectrum& a, const Spectrum& b, double epsilon) {
+  std::vector<std::complex<double>> products;
   double strongest = 0;
-  for (std::size_t i = 0; i < a_.size(); i += 2)
-    strongest = std::max<double>(strongest, std::hypot(a_[i], a_[i + 1]) * std::hypot(b_[i], b_[i + 1]));
-  const double pixels = static_cast<double>(surface_.size());
-  for (std::size_t i = 0; i < a_.size(); i += 2) {
-    const double ar = a_[i], ai = a_[i + 1], br = b_[i], bi = b_[i + 1];
-    const double re = ar * br + ai * bi, im = ai * br - ar * bi;
-    const double scale = 1 / ((std::hypot(re, im) + epsilon * strongest) * pixels);
-    cross_[i] = static_cast<float>(re * scale);
-    cross_[i + 1] = static_cast<float>(im * scale);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    products.push_back(std::complex<double>(a[i]) * std::conj(std::complex<double>(b[i])));
+    strongest = std::max(strongest, std::abs(products.back()));
   }
-  to_surface(cross_);
+  Spectrum cross;
+  for (const std::complex<double>& r : products)
+    cross.emplace_back(r / ((std::abs(r) + epsilon * strongest) * static_cast<double>(a.size())));
+  const Spectrum surface = transformed(cross, inverse_);
+  std::ranges::transform(surface, surface_.begin(), [](std::complex<float> value) { return value.real(); });
 }
 
 PhaseCorrelation PhaseCorrelator::operator()(std::span<const float> a, std::span<const float> b) {
-  const bool a_varies = transform(a, a_), b_varies = transform(b, b_);
-  if (!a_varies || !b_varies) return {};
+  const Spectrum of_a = spectrum_of(a), of_b = spectrum_of(b);
+  if (of_a.empty() || of_b.empty()) return {};
   PhaseCorrelation result{.defined = true};
-  correlate(kPeakEpsilon);
+  correlate(of_a, of_b, kPeakEpsilon);
   result.peak = *std::max_element(surface_.begin(), surface_.end());
 
-  correlate(kShiftEpsilon);
+  correlate(of_a, of_b, kShiftEpsilon);
   const int top = static_cast<int>(std::max_element(surface_.begin(), surface_.end()) - surface_.begin());
   const int row = top / width_, column = top % width_;
   const auto at = [&](int r, int c) {

@@ -1,11 +1,11 @@
 #pragma once
 
+#include <complex>
 #include <memory>
 #include <span>
 #include <vector>
 
 struct kiss_fft_state;
-struct kiss_fftr_state;
 
 namespace supertac {
 
@@ -35,7 +35,7 @@ class PhaseCorrelator {
   static constexpr double kFlat =
       1e-6;  ///< an image is flat when no pixel is further than this from the mean
 
-  /// Throws std::invalid_argument when a side is odd or below 4.
+  /// Throws std::invalid_argument when a side is below 4.
   PhaseCorrelator(int height, int width);
 
   /// `a`, `b`  [height][width]. Throws std::invalid_argument on another number of pixels.
@@ -45,24 +45,21 @@ class PhaseCorrelator {
   struct Free {
     void operator()(void* plan) const;
   };
-  struct Plans {  // of both axes, one way
+  using Plan = std::unique_ptr<kiss_fft_state, Free>;
+  struct Plans {  // one way
     Plans(int height, int width, bool inverse);
-    std::unique_ptr<kiss_fftr_state, Free> along_rows;
-    std::unique_ptr<kiss_fft_state, Free> along_columns;
+    Plan of_rows, of_columns;
   };
-  using Spectrum = std::vector<float>;  // re, im interleaved, [height][width/2 + 1]
+  using Spectrum = std::vector<std::complex<float>>;  // [height][width]
 
-  bool transform(std::span<const float> image, Spectrum& out);
-  void correlate(double epsilon);
-  void to_spectrum(Spectrum& out);
-  void to_surface(const Spectrum& spectrum);
+  Spectrum transformed(const Spectrum& image, const Plans& plans) const;
+  Spectrum spectrum_of(std::span<const float> image) const;
+  void correlate(const Spectrum& a, const Spectrum& b, double epsilon);
 
   int height_, width_;
   Plans forward_, inverse_;
   std::vector<float> down_, across_;  // Hann windows of both axes
   std::vector<float> surface_;        // [height][width]
-  Spectrum a_, b_, cross_;
-  Spectrum row_, column_, turned_;  // of one row and one column; [width/2 + 1][height]
 };
 
 }  // namespace supertac

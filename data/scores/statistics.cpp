@@ -19,22 +19,6 @@ constexpr std::size_t kMostExact = 20;
 constexpr std::uint64_t kRandomPatterns = 100'000;
 constexpr std::uint64_t kBootstrapStream = 0x626f6f74, kSignStream = 0x7369676e;
 
-void check(std::span<const std::vector<ClusterCount>> of_seeds, std::span<const std::size_t> strata) {
-  if (of_seeds.empty() || of_seeds.front().empty())
-    throw std::invalid_argument("bootstrap_interval: expected at least one cluster, got none");
-  const std::size_t count = of_seeds.front().size();
-  for (const std::vector<ClusterCount>& clusters : of_seeds) {
-    if (clusters.size() != count || (!strata.empty() && strata.size() != count))
-      throw std::invalid_argument("bootstrap_interval: expected the same " + std::to_string(count) +
-                                  " clusters for each seed, and a stratum for each or none, got " +
-                                  std::to_string(clusters.size()) + " and " + std::to_string(strata.size()));
-    for (const ClusterCount& c : clusters)
-      if (!(c.total > 0))
-        throw std::invalid_argument("bootstrap_interval: expected clusters with a total above 0, got " +
-                                    format(c.total));
-  }
-}
-
 }  // namespace
 
 double share(std::span<const ClusterCount> clusters) {
@@ -46,36 +30,32 @@ double share(std::span<const ClusterCount> clusters) {
   return total > 0 ? correct / total : std::numeric_limits<double>::quiet_NaN();
 }
 
-Interval bootstrap_interval(std::span<const ClusterCount> clusters) {
-  const std::vector<ClusterCount> one(clusters.begin(), clusters.end());
-  return bootstrap_interval({&one, 1});
-}
-
-Interval bootstrap_interval(std::span<const std::vector<ClusterCount>> of_seeds,
-                            std::span<const std::size_t> strata) {
-  check(of_seeds, strata);
-  const std::size_t count = of_seeds.front().size();
+Interval bootstrap_interval(std::span<const ClusterCount> clusters, std::span<const std::size_t> strata) {
+  const std::size_t count = clusters.size();
+  if (count == 0 || (!strata.empty() && strata.size() != count))
+    throw std::invalid_argument(
+        "bootstrap_interval: expected a cluster at least, and a stratum for each or none, got " +
+        std::to_string(count) + " and " + std::to_string(strata.size()));
+  for (const ClusterCount& c : clusters)
+    if (!(c.total > 0))
+      throw std::invalid_argument("bootstrap_interval: expected clusters with a total above 0, got " +
+                                  format(c.total));
   std::vector<std::size_t> order(count);  // clusters by stratum
   std::iota(order.begin(), order.end(), std::size_t{0});
   if (!strata.empty()) std::ranges::stable_sort(order, {}, [&](std::size_t c) { return strata[c]; });
   const RandomStream random(0, kBootstrapStream);
   std::uint64_t counter = 0;
-  const auto below = [&](std::size_t n) {
-    return static_cast<std::size_t>(random.uniform(counter++) * static_cast<double>(n));
-  };
-  std::vector<std::size_t> drawn(count), seeds(of_seeds.size());
   std::vector<double> shares(kDraws);
   for (double& one : shares) {
+    double correct = 0, total = 0;
     for (std::size_t begin = 0, end = 0; begin < count; begin = end) {
       while (end < count && (strata.empty() || strata[order[end]] == strata[order[begin]])) ++end;
-      for (std::size_t i = begin; i < end; ++i) drawn[i] = order[begin + below(end - begin)];
+      for (std::size_t i = begin; i < end; ++i) {
+        const double drawn = random.uniform(counter++) * static_cast<double>(end - begin);
+        const ClusterCount& c = clusters[order[begin + static_cast<std::size_t>(drawn)]];
+        correct += c.correct, total += c.total;
+      }
     }
-    if (seeds.size() > 1)
-      for (std::size_t& seed : seeds) seed = below(seeds.size());
-    double correct = 0, total = 0;
-    for (const std::size_t seed : seeds)
-      for (const std::size_t c : drawn)
-        correct += of_seeds[seed][c].correct, total += of_seeds[seed][c].total;
     one = correct / total;
   }
   std::sort(shares.begin(), shares.end());

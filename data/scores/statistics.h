@@ -21,19 +21,10 @@ struct Interval {
 double share(std::span<const ClusterCount> clusters);
 
 /// 95 % percentile bootstrap interval of share() over clusters drawn with replacement (Efron & Tibshirani
-/// 1993, ch. 13; 10,000 draws: the same counts, the same interval).
-/// Throws std::invalid_argument when there is no cluster or one holds nothing.
-Interval bootstrap_interval(std::span<const ClusterCount> clusters);
-
-/// The same over seeds and passes, the two things that another run would have otherwise (hierarchical
-/// bootstrap; Saravanan, Berman, Sober 2020): of_seeds[s][c] is cluster c as the network of seed s has it,
-/// the same clusters in the same order for each. A draw takes as many seeds, and within each stratum
-/// (strata[c], a plate say; none: all are one) as many clusters as there are, with replacement; each seed
-/// drawn has the clusters drawn. One seed is no draw: the interval is then of this network alone. For a
-/// comparison of two methods, paired by cluster and seed, `correct` is the sum of the differences. Throws as
-/// above, and when sizes differ.
-Interval bootstrap_interval(std::span<const std::vector<ClusterCount>> of_seeds,
-                            std::span<const std::size_t> strata = {});
+/// 1993, ch. 13; 10,000 draws: the same counts, the same interval), within each stratum (strata[c], a plate
+/// say; none: all are one) as many as there are. Throws std::invalid_argument when there is no cluster or one
+/// holds nothing, or strata are of another number.
+Interval bootstrap_interval(std::span<const ClusterCount> clusters, std::span<const std::size_t> strata = {});
 
 /// Two-sided p-value of the paired permutation test: if two methods did not differ, exchanging their results
 /// within a pass, which flips the sign of that pass's difference, would change nothing. p is the share of the

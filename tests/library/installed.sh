@@ -1,5 +1,5 @@
 #!/bin/sh
-# From an installed SuperTac in an odd prefix: the C example, load_and_draw and inlined arithmetic through pkg-config.
+# From an installed SuperTac in an odd prefix: the C example, train and inlined arithmetic through pkg-config.
 #   installed.sh SOURCE PREFIX LIBDIR BUILD
 set -eu
 source=$1 prefix=$2 libdir=$3 build=$4
@@ -13,10 +13,6 @@ fail() {
 # shellcheck disable=SC2046  # flags are words
 cc -std=c99 -Wall -Wextra -Werror "$source/examples/draw_live.c" -o draw_live $(pkg-config --cflags --libs supertac)
 ./draw_live missing.safetensors 100 < /dev/null 2> said && fail "a missing model is no error"
-grep -q "missing.safetensors" said || fail "the error does not name the file: $(cat said)"
-# shellcheck disable=SC2046
-c++ -std=c++20 -O1 "$source/examples/load_and_draw.cpp" -o load_and_draw $(pkg-config --cflags --libs supertac-cpp)
-./load_and_draw missing.safetensors none 1 none.png 2> said && fail "a missing model is no error"
 grep -q "missing.safetensors" said || fail "the error does not name the file: $(cat said)"
 # shellcheck disable=SC2046
 c++ -std=c++20 -O1 "$source/examples/train.cpp" -o train $(pkg-config --cflags --libs supertac-cpp)

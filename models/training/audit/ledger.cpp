@@ -140,22 +140,4 @@ std::optional<LedgerDifference> difference(const Ledger& header, const LedgerLin
   return d;
 }
 
-std::optional<LedgerDifference> first_difference(const Ledger& a, const Ledger& b) {
-  if (a.names != b.names || a.every != b.every)
-    throw std::invalid_argument(
-        "ledgers: expected two of the same network and the same steps from line to line");
-  const std::size_t both = std::min(a.lines.size(), b.lines.size());
-  std::size_t low = 0, high = both;  // the chains agree before low, and differ from high on
-  while (low < high) {
-    const std::size_t middle = (low + high) / 2;
-    if (a.lines[middle].chain == b.lines[middle].chain) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  return low == both ? std::nullopt
-                     : difference(a, LedgerLine::of(a.lines[low].text), LedgerLine::of(b.lines[low].text));
-}
-
 }  // namespace supertac

@@ -61,18 +61,15 @@ class LedgerWriter {
   Sha256 batches_;
 };
 
-/// The first difference of two ledgers, found by bisection of their chains.
+/// How a line differs from that of a ledger.
 struct LedgerDifference {
   std::int64_t after = 0, step = 0;  ///< it came about behind the one and up to the other
   /// The first tensor that differs at `step`; "the batches" where those differ, and all tensors are the same.
   std::string what;
   bool batches = false;  ///< whether other batches were taken
 };
-/// Empty when they agree as far as both go. Throws std::invalid_argument when they are of other tensors or
-/// have no step in common.
-std::optional<LedgerDifference> first_difference(const Ledger& a, const Ledger& b);
-/// The same for one line of each, at the same step. Throws std::runtime_error when their number of tensors is
-/// not the header's.
+/// Of two lines of the same step; empty when they are the same. Throws std::runtime_error when their number
+/// of tensors is not the header's.
 std::optional<LedgerDifference> difference(const Ledger& header, const LedgerLine& a, const LedgerLine& b);
 
 }  // namespace supertac

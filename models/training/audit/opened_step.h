@@ -1,7 +1,7 @@
 // A step of a training, opened: every operator that ran, forward and in reverse, with the SHA-256 of all that
 // went into it and came out, from the state before the step to the state behind it. So two trainings that
-// should be the same can be compared down to the operator where they part, and a single operator can be
-// computed again.
+// should be the same can be compared down to the operator where they part (examples/verify_ledger.py), and a
+// single operator can be computed again (examples/referee.py).
 #pragma once
 
 #include <map>
@@ -25,17 +25,5 @@ struct OpenedStep {
 /// trains in several processes. `keep`: the arrays of the operators whose name begins so are kept; empty:
 /// none are.
 OpenedStep open_step(Trainer& trainer, const std::optional<std::string>& keep = {});
-
-/// The first operator in which two openings of the same step differ.
-struct OperatorDifference {
-  std::string name, op;
-  /// "output 0", "input 1" where an input differs that no operator made, "the settings".
-  std::string what;
-  std::string one, other;  ///< SHA-256 and shape of the arrays, or the settings
-};
-/// Empty when all is the same. Throws std::invalid_argument when they have other operators: of another
-/// network.
-std::optional<OperatorDifference> first_difference(const nlohmann::ordered_json& one,
-                                                   const nlohmann::ordered_json& other);
 
 }  // namespace supertac

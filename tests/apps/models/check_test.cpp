@@ -133,9 +133,6 @@ TEST_F(Audit, APartThatIsRepeatedGivesTheLedgersLines) {
 
   // A state is exchanged for that of another training.
   train("other.safetensors", "--learning-rate 0.0009");
-  const auto two = run("supertac-check ledgers kept.run/ledger.jsonl other.run/ledger.jsonl");
-  EXPECT_EQ(two.code, 1);
-  EXPECT_TRUE(contains(two.out, "differs between steps 1 and 2: encoder.0.conv.0.weight"));
   std::filesystem::copy(path("other.safetensors"), path("kept.safetensors"),
                         std::filesystem::copy_options::overwrite_existing);
   EXPECT_EQ(audit("kept.safetensors", "1").code, 1);
@@ -169,17 +166,21 @@ TEST_F(Audit, ALedgerThatWasChangedIsRefused) {
 TEST_F(Audit, TwoTrainingsPartAtAnOperator) {
   train("first.safetensors");
   train("second.safetensors", "--beta 0.002");
-  EXPECT_EQ(run("supertac-check ledgers first.run/ledger.jsonl second.run/ledger.jsonl").code, 1);
+  if (!has_numpy()) GTEST_SKIP() << "there is no Debian Python with NumPy here";
+  const auto compare = [](const std::string& two) { return python("verify_ledger.py " + two, "said.txt"); };
+  EXPECT_NE(compare("first.run/ledger.jsonl second.run/ledger.jsonl"), 0);
+  EXPECT_TRUE(bytes("said.txt").starts_with("step 2, encoder.0.conv.0.weight: ")) << bytes("said.txt");
+  EXPECT_EQ(compare("first.run/ledger.jsonl first.run/ledger.jsonl"), 0) << bytes("said.txt");
 
   // The same step of both, each opened for itself.
   for (const std::string name : {"first", "second"})
     succeed("supertac-check step " + name + ".safetensors --data data --step 1 --json " + name + ".json");
-  const auto opened = run("supertac-check ledgers first.json second.json");
-  EXPECT_EQ(opened.code, 1);
-  EXPECT_TRUE(std::regex_search(opened.out, std::regex("0/[0-9]+\\.scale, the settings"))) << opened.out;
-  succeed("supertac-check ledgers first.json first.json");
-  expect_failure(run("supertac-check ledgers first.json first.json --data data"), 2,
-                 "--data: nothing that ledgers reads");
+  EXPECT_NE(compare("first.json second.json"), 0);
+  EXPECT_TRUE(std::regex_search(bytes("said.txt"), std::regex("^0/[0-9]+\\.scale, the settings: ")))
+      << bytes("said.txt");
+  EXPECT_EQ(compare("first.json first.json"), 0) << bytes("said.txt");
+  expect_failure(run("supertac-check file first.safetensors --data data"), 2,
+                 "--data: nothing that file reads");
 }
 
 // Every operator of a step once more by NumPy, to the bit, and one of which a bit was changed.

@@ -112,10 +112,8 @@ TEST(PhaseCorrelation, FlatImagesHaveNoPhase) {
 }
 
 TEST(PhaseCorrelation, RefusesOtherSizes) {
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { PhaseCorrelator(15, 16); }),
-            "phase correlation: sides must be even and at least 4, got 15x16");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { PhaseCorrelator(8, 2); }),
-            "phase correlation: sides must be even and at least 4, got 8x2");
+            "phase correlation: sides must be at least 4, got 8x2");
   PhaseCorrelator correlator(8, 8);
   const std::vector<float> small(64), large(65);
   EXPECT_EQ(what_of<std::invalid_argument>([&] { correlator(small, large); }),

@@ -43,27 +43,16 @@ TEST(BootstrapInterval, DoesNotShrinkWithFramesWithinAPass) {
 TEST(BootstrapInterval, DrawsPassesWithinTheirPlate) {
   const std::vector<ClusterCount> passes = {{9, 10}, {5, 10}, {9, 10}, {5, 10}};
   const std::size_t plates[] = {0, 1, 0, 1};
-  const Interval within = bootstrap_interval({&passes, 1}, plates), all = bootstrap_interval({&passes, 1});
+  const Interval within = bootstrap_interval(passes, plates), all = bootstrap_interval(passes);
   EXPECT_DOUBLE_EQ(within.low, 0.7);
   EXPECT_DOUBLE_EQ(within.high, 0.7);
   EXPECT_LT(all.low, 0.6);
 }
 
-// What differs between seeds alone is seen by drawing seeds: the mean of two coins, a quarter on each side.
-TEST(BootstrapInterval, DrawsSeedsToo) {
-  const std::vector<std::vector<ClusterCount>> seeds = {{{8, 10}, {8, 10}}, {{6, 10}, {6, 10}}};
-  const Interval interval = bootstrap_interval(seeds);
-  EXPECT_DOUBLE_EQ(interval.low, 0.6);
-  EXPECT_DOUBLE_EQ(interval.high, 0.8);
-  EXPECT_DOUBLE_EQ(bootstrap_interval({&seeds[0], 1}).high, 0.8);
-  const std::vector<std::vector<ClusterCount>> uneven = {{{8, 10}, {8, 10}}, {{6, 10}}};
-  EXPECT_ERROR(bootstrap_interval(uneven), std::invalid_argument, "the same 2 clusters for each seed");
-}
-
 TEST(BootstrapInterval, RefusesNothing) {
   const ClusterCount empty[] = {{1, 2}, {0, 0}};
   EXPECT_EQ(what_of<std::invalid_argument>([&] { bootstrap_interval(std::span<const ClusterCount>()); }),
-            "bootstrap_interval: expected at least one cluster, got none");
+            "bootstrap_interval: expected a cluster at least, and a stratum for each or none, got 0 and 0");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { bootstrap_interval(empty); }),
             "bootstrap_interval: expected clusters with a total above 0, got 0");
 }

@@ -40,21 +40,25 @@ Ledger read(const std::string& text) {
 
 const std::vector<Entry> kRun = {{"x", "1", "2"}, {"y", "3", "4"}, {"z", "5", "6"}};
 
-TEST(Ledger, AgreesWithItselfAndWithItsOwnBeginning) {
-  const Ledger run = read(ledger_of(kRun)), beginning = read(ledger_of({kRun[0], kRun[1]}));
+/// Of the lines of a step in two ledgers.
+std::optional<LedgerDifference> difference_at(std::int64_t step, const Ledger& one, const Ledger& other) {
+  return difference(one, one.at(step).value(), other.at(step).value());
+}
+
+TEST(Ledger, AgreesWithItself) {
+  const Ledger run = read(ledger_of(kRun));
   EXPECT_EQ(run.every, 5);
   EXPECT_EQ(run.lines.size(), 3U);
-  EXPECT_FALSE(first_difference(run, run));
-  EXPECT_FALSE(first_difference(run, beginning));
-  EXPECT_FALSE(first_difference(beginning, run));
+  for (const std::int64_t step : {5, 10, 15}) EXPECT_FALSE(difference_at(step, run, run));
+  EXPECT_FALSE(run.at(7));
 }
 
 TEST(Ledger, NamesTheStepAndTheFirstTensorThatDiffers) {
   const Ledger run = read(ledger_of(kRun));
   for (std::size_t at = 0; at < kRun.size(); ++at) {
     std::vector<Entry> changed = kRun;
-    for (std::size_t i = at; i < changed.size(); ++i) changed[i].second += "0";
-    const auto found = first_difference(run, read(ledger_of(changed)));
+    changed[at].second += "0";
+    const auto found = difference_at(static_cast<std::int64_t>(5 * at + 5), run, read(ledger_of(changed)));
     ASSERT_TRUE(found) << at;
     EXPECT_EQ(found->step, static_cast<std::int64_t>(5 * at + 5));
     EXPECT_EQ(found->after, static_cast<std::int64_t>(5 * at));
@@ -66,7 +70,7 @@ TEST(Ledger, NamesTheStepAndTheFirstTensorThatDiffers) {
 TEST(Ledger, NamesTheBatchesWhereAllTensorsAreTheSame) {
   std::vector<Entry> changed = kRun;
   changed[1].batches = "w";
-  const auto found = first_difference(read(ledger_of(kRun)), read(ledger_of(changed)));
+  const auto found = difference_at(10, read(ledger_of(kRun)), read(ledger_of(changed)));
   ASSERT_TRUE(found);
   EXPECT_EQ(found->step, 10);
   EXPECT_EQ(found->what, "the batches");
