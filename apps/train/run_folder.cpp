@@ -23,9 +23,8 @@ constexpr std::uint64_t kMaxLogBytes = 64 << 20;
 std::string csv(const LogLine& line) {
   std::string out = format(line.time_s, 3) + "," + std::to_string(line.step);
   for (const double v : {line.total, line.reconstruction, line.kld, line.l2, line.ssim, line.gradient_norm,
-                         line.learning_rate}) {
+                         line.learning_rate})
     out += "," + format(v);
-  }
   out += "," + (line.test_ssim ? format(*line.test_ssim, 5) : "");
   out += "," + (line.test_psnr_db ? format(*line.test_psnr_db, 3) : "");
   return out + "\n";
@@ -36,9 +35,8 @@ std::optional<LogLine> parse(const std::string& text) {
   std::vector<std::optional<double>> v;
   for (const std::string& field : comma_list(text + ",")) v.push_back(parse_double(field));
   if (v.size() != 11) return std::nullopt;
-  for (std::size_t i = 0; i < 9; ++i) {
+  for (std::size_t i = 0; i < 9; ++i)
     if (!v[i]) return std::nullopt;
-  }
   return LogLine{{*v[2], *v[3], *v[4], *v[5], *v[6]},
                  *v[0],
                  static_cast<std::int64_t>(*v[1]),
