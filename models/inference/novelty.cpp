@@ -49,8 +49,6 @@ Matrix inverse_of_lower(const Matrix& l, std::size_t d) {
   return inverse;
 }
 
-std::vector<float> rounded(const std::vector<double>& values) { return {values.begin(), values.end()}; }
-
 }  // namespace
 
 Novelty::Novelty(const Tensor& features) {
@@ -63,8 +61,9 @@ Novelty::Novelty(const Tensor& features) {
   for (double& m : mean) m /= static_cast<double>(n);
   Matrix l = covariance_of(features, mean);
   factorise(l, size);
-  mean_ = rounded(mean);
-  whitening_ = rounded(inverse_of_lower(l, size));
+  mean_.assign(mean.begin(), mean.end());
+  const Matrix whitening = inverse_of_lower(l, size);
+  whitening_.assign(whitening.begin(), whitening.end());
   std::vector<double> distances;
   for (std::size_t row = 0; row < count; ++row)
     distances.push_back(distance(features.values().subspan(row * size, size)));

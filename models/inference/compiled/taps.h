@@ -28,10 +28,8 @@ struct FeatureMap {
   /// From an image's beginning to its first pixel.
   Dim origin() const { return margin_h * line() + margin_w * channels; }
   kernels::Strides strides() const { return {image(), line(), channels}; }
-  bool same_layout(const FeatureMap& other) const {
-    return height == other.height && width == other.width && channels == other.channels &&
-           margin_h == other.margin_h && margin_w == other.margin_w;
-  }
+  bool operator==(const FeatureMap&) const = default;
+  bool same_layout(FeatureMap other) const { return other.offset = offset, *this == other; }
 };
 
 /// Fills the margins of so many images of a map, of which `image` is the first.
