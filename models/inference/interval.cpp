@@ -113,13 +113,13 @@ double IntervalCoverage::half_width() const {
   return sum / pixels;
 }
 
-PixelInterval IntervalCoverage::found(double share) const {
+PixelInterval IntervalCoverage::found() const {
   std::size_t least = 0;  // bins
   for (std::size_t height = 0; height < kHeights; ++height) {
     double passes = 0, covered = 0;
     for (const Pass& pass : passes_) passes += pass.heights[height].pixels > 0 ? 1 : 0;
     std::size_t bin = 0;
-    for (; bin < kBins && covered < share * passes * (1 - 1e-12); ++bin)
+    for (; bin < kBins && covered < kCovered * passes * (1 - 1e-12); ++bin)
       for (const Pass& pass : passes_)
         if (const Height& h = pass.heights[height]; h.pixels > 0)
           covered += h.ratios[bin] / static_cast<double>(h.pixels);

@@ -74,10 +74,10 @@ class IntervalCoverage {
   // Not to be asked when empty():
   double share() const;  ///< of all pixels, mean over passes
   Held of_height(std::size_t height) const;
-  /// With the judged shift the least factor that holds `share` in each height, in steps of 0.05; 20 where
+  /// With the judged shift the least factor that holds kCovered in each height, in steps of 0.05; 20 where
   /// none does (Mondrian conformal prediction with the largest class for all; Vovk, Gammerman, Shafer 2005,
   /// ch. 4.5).
-  PixelInterval found(double share = kCovered) const;
+  PixelInterval found() const;
   double half_width() const;  ///< mean over all pixels
 
  private:

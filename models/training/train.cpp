@@ -15,9 +15,6 @@ namespace supertac {
 namespace {
 
 constexpr std::size_t kTestedPerEpoch = 2000;
-// Intervals are to hold on groups that nobody has seen, which differ from those that they are found on: of
-// pressed objects other groups hold up to a tenth less.
-constexpr double kHeldOnFoundGroups = 0.95;
 constexpr std::int64_t kStepsPerLine = 50;
 
 void test(const Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop,
@@ -131,8 +128,7 @@ std::map<std::string, std::string> trained_origin(const Trainer& trainer, const 
                     });
     return coverage;
   };
-  const PixelInterval plain = judged({}).found(kHeldOnFoundGroups),
-                      loaded = judged({.load = most}).found(kHeldOnFoundGroups);
+  const PixelInterval plain = judged({}).found(), loaded = judged({.load = most}).found();
   origin["interval_factor"] =
       (judged(loaded).half_width() < judged(plain).half_width() ? loaded : plain).text();
   origin["interval_factor_found"] = "tested groups";

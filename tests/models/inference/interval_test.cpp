@@ -72,7 +72,6 @@ TEST(IntervalCoverage, FindsTheFactorThatHoldsEachHeight) {
   coverage.add(3, picture, 20, truth, predicted);
   EXPECT_DOUBLE_EQ(coverage.share(), 0.75);
   EXPECT_EQ(coverage.found(), (PixelInterval{0, 9}));
-  EXPECT_EQ(coverage.found(0.5), (PixelInterval{0, 5}));
   EXPECT_NEAR(coverage.half_width(), 0.5, 1e-6);
   EXPECT_DOUBLE_EQ(coverage.of_height(0).share, 0.5);
   EXPECT_DOUBLE_EQ(coverage.of_height(3).share, 1);
