@@ -159,11 +159,12 @@ def later():
 
 def shown_elements():
     found, lines = rows("accuracy/elements.csv"), []
-    names = {"paper": "all four plates", "without the plate": "three other plates", "random plates beside": "and random plates"}
-    for network, trial in [("paper", "2"), *((n, t) for t in "12" for n in list(names)[1:])]:
+    names = {"paper": "all four plates", "paper, 0.6 s later": "all four, `--delay 0.6`", "without the plate": "three others",
+             "random plates beside": "and random ones", "random plates beside, 0.6 s later": "and random ones, `--delay 0.6`"}
+    for network, trial in [("paper", "2"), ("paper, 0.6 s later", "2"), *((n, t) for t in "12" for n in list(names)[2:])]:
         for plate in [*dict.fromkeys(r["plate"] for r in found), "all"]:
             of = [r for r in chosen(found, network=network, trial=trial, map_of="plate") if plate in ("all", r["plate"])]
-            if network == "without the plate" and plate != "all":
+            if network in ("paper", "without the plate", "random plates beside") and plate != "all":
                 continue
             total = {key: sum(int(r[key]) for r in of) for key in ("existing", "found", "false")}
             lines.append([plate, names[network], trial, f"{total['found']} of {total['existing']}", str(total["false"]),
