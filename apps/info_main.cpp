@@ -1,6 +1,7 @@
 // supertac-info: the card of a recording, a model, or any other safetensors file, and of a folder of
 // recordings: what it holds and how it was made.
 
+#include <cmath>
 #include <filesystem>
 #include <sstream>
 
@@ -26,6 +27,8 @@ void declare(Arguments& arguments) {
 
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 std::uint64_t elements(const TensorInfo& tensor) {
   std::uint64_t count = 1;
   for (const std::uint64_t size : tensor.shape) count *= size;
@@ -40,7 +43,7 @@ std::string kind_of(const SafetensorsFile& file) {
 }
 
 /// Metadata values are text; those that hold a JSON object are shown as one, the rest as they are.
-nlohmann::ordered_json value_of(const std::string& text) {
+Json value_of(const std::string& text) {
   if (!text.starts_with('{')) return text;
   try {
     return parse_json_limited(text);
@@ -49,12 +52,24 @@ nlohmann::ordered_json value_of(const std::string& text) {
   }
 }
 
-nlohmann::ordered_json card(const SafetensorsFile& file, const std::string& kind) {
-  nlohmann::ordered_json card = {{"file", file.path()}, {"kind", kind}};
-  card["content"] = content_hash(file);
+/// What a recording adds; reads the file as one, so that what is wrong with it is said here too.
+Json card_of_recording(const std::string& path) {
+  const Recording recording = read_recording(path);
+  const std::size_t n = recording.frames();
+  const double duration = n > 0 ? recording.time_s.back() - recording.time_s.front() : 0;
+  return {{"frames", n},
+          {"duration_s", std::round(1e3 * duration) / 1e3},
+          {"mean_rate_hz", duration > 0 ? std::round(1e3 * static_cast<double>(n - 1) / duration) / 1e3 : 0},
+          {"position_known", !recording.position_mm.empty()}};
+}
+
+Json card_of_file(const std::string& path) {
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  Json card = {{"file", file.path()}, {"kind", kind_of(file)}, {"content", content_hash(file)}};
   card["checksum"] = file.has_checksum() ? "ok" : "absent";
+  if (card["kind"] == "recording") card.update(card_of_recording(path));
   std::uint64_t values = 0;
-  nlohmann::ordered_json tensors = nlohmann::ordered_json::array();
+  Json tensors = Json::array();
   for (const auto& [name, tensor] : file.tensors()) {
     values += elements(tensor);
     tensors.push_back({{"name", name}, {"dtype", tensor.dtype}, {"shape", tensor.shape}});
@@ -65,73 +80,52 @@ nlohmann::ordered_json card(const SafetensorsFile& file, const std::string& kind
   return card;
 }
 
-void print_row(const Arguments& arguments, const std::string& name, const std::string& value) {
-  arguments.print(left_aligned(printable(name), 28) + printable(value, 200));
-}
-
-std::string text_of(const nlohmann::ordered_json& value) {
-  return value.is_string() ? value.get<std::string>() : value.dump();
-}
-
-void print_metadata(const Arguments& arguments, const SafetensorsFile& file) {
-  for (const auto& [key, text] : file.metadata()) {
-    const auto value = value_of(text);
-    if (!value.is_object()) {
-      print_row(arguments, key, text);
-      continue;
-    }
-    for (const auto& [name, entry] : value.items()) {
-      print_row(arguments, key + "." + name, text_of(entry));
-    }
-  }
-}
-
-/// Frames, duration and rate; reads the file as a recording, so that what is wrong with it is said here too.
-void print_recording(const Arguments& arguments, nlohmann::ordered_json& card) {
-  const Recording recording = read_recording(arguments.text("FILE"));
-  const std::size_t n = recording.frames();
-  const double duration = n > 0 ? recording.time_s.back() - recording.time_s.front() : 0;
-  const double rate = duration > 0 ? static_cast<double>(n - 1) / duration : 0;
-  print_row(arguments, "frames", std::to_string(n));
-  print_row(arguments, "duration", format(duration, 3) + " s");
-  print_row(arguments, "mean rate", format(rate, 2) + " Hz");
-  print_row(arguments, "position", recording.position_mm.empty() ? "unknown" : "known");
-  card["frames"] = n;
-  card["duration_s"] = duration;
-  card["mean_rate_hz"] = rate;
-  card["position_known"] = !recording.position_mm.empty();
-}
-
-/// A folder of recordings: what all have in common in their provenance, and each time that it was filled.
-int describe_folder(const Arguments& arguments) {
+/// Of a folder of recordings: what all have in common in their provenance, and each time that it was filled.
+Json card_of_folder(const std::string& folder) {
   namespace fs = std::filesystem;
   constexpr std::uint64_t kMostBytes = 16 << 20;
-  const std::string folder = arguments.text("FILE");
-  const std::size_t count = list_recordings(folder).size();
-  nlohmann::ordered_json card = {{"folder", folder},
-                                 {"kind", "recordings"},
-                                 {"files", count},
-                                 {"content", hash_of_recordings(folder, {})},
-                                 {"provenance", nlohmann::ordered_json::array()}};
-  for (const char* key : {"folder", "kind", "files", "content"})
-    print_row(arguments, key, text_of(card[key]));
+  Json card = {{"folder", folder},
+               {"kind", "recordings"},
+               {"files", list_recordings(folder).size()},
+               {"content", hash_of_recordings(folder, {})},
+               {"provenance", Json::array()}};
   const fs::path made = fs::path(folder) / kFolderProvenance;
   std::error_code error;
   std::istringstream lines(fs::exists(made, error) ? read_text_file(made, kMostBytes) : "");
-  for (std::string line; std::getline(lines, line);) {
-    const auto entry = value_of(line);
-    if (!entry.is_object()) continue;
-    arguments.print("");
-    for (const auto& [key, value] : entry.items()) print_row(arguments, key, text_of(value));
-    card["provenance"].push_back(entry);
+  for (std::string line; std::getline(lines, line);)
+    if (Json entry = value_of(line); entry.is_object()) card["provenance"].push_back(std::move(entry));
+  return card;
+}
+
+void print_row(const Arguments& arguments, const std::string& name, const Json& value) {
+  const std::string text = value.is_string()         ? value.get<std::string>()
+                           : value.is_number_float() ? format(value.get<double>())
+                                                     : value.dump();
+  arguments.print(left_aligned(printable(name), 28) + printable(text, 200));
+}
+
+/// A row for each entry; in a card of `ours` a tensor is one, and each filling of a folder stands below an
+/// empty line.
+void print_card(const Arguments& arguments, const Json& card, const std::string& before = "",
+                bool ours = true) {
+  for (const auto& [key, value] : card.items()) {
+    if (value.is_object()) {
+      print_card(arguments, value, key == "metadata" ? "" : before + key + ".", false);
+    } else if (ours && key == "tensors") {
+      for (const Json& tensor : value)
+        print_row(arguments, "  " + tensor["name"].get<std::string>(),
+                  tensor["dtype"].get<std::string>() + " " + tensor["shape"].dump());
+    } else if (ours && key == "provenance") {
+      for (const Json& filling : value) arguments.print(""), print_card(arguments, filling, "", false);
+    } else {
+      print_row(arguments, before + key, value);
+    }
   }
-  arguments.write_json(card);
-  return kExitOk;
 }
 
 // As supertac-export --c99 writes it without other options.
 int print_chain(const Arguments& arguments) {
-  nlohmann::ordered_json chain = nlohmann::ordered_json::array();
+  Json chain = Json::array();
   for (const ChainLink& link : exported(SafetensorsFile::read(arguments.text("FILE")), "finger", 0).chain) {
     print_row(arguments, link.name, link.hash);
     chain.push_back({{"link", link.name}, {"hash", link.hash}});
@@ -144,22 +138,10 @@ int print_chain(const Arguments& arguments) {
 
 int run(Arguments& arguments) {
   if (arguments.flag("chain")) return print_chain(arguments);
-  if (std::filesystem::is_directory(arguments.text("FILE"))) return describe_folder(arguments);
-  const SafetensorsFile file = SafetensorsFile::read(arguments.text("FILE"));
-  const std::string kind = kind_of(file);
-  auto result = card(file, kind);
-  const bool ours = file.has_checksum();
-  print_row(arguments, "file", file.path());
-  print_row(arguments, "kind", kind);
-  print_row(arguments, "content", text_of(result["content"]));
-  print_row(arguments, "checksum", ours ? "ok" : "absent: written by another program, damage cannot be seen");
-  if (kind == "recording") print_recording(arguments, result);
-  print_metadata(arguments, file);
-  print_row(arguments, "values in all tensors", std::to_string(result["values"].get<std::uint64_t>()));
-  for (const auto& [name, tensor] : file.tensors()) {
-    print_row(arguments, "  " + name, tensor.dtype + " " + shape_text(tensor.shape));
-  }
-  arguments.write_json(result);
+  const std::string path = arguments.text("FILE");
+  const Json card = std::filesystem::is_directory(path) ? card_of_folder(path) : card_of_file(path);
+  print_card(arguments, card);
+  arguments.write_json(card);
   return kExitOk;
 }
 
