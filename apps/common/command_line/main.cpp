@@ -7,11 +7,11 @@ void declare(Arguments& arguments);
 int run(Arguments& arguments);
 // In a source that apps/CMakeLists.txt writes for each program.
 extern const char *program_name, *program_purpose;
-extern Numerics (*program_numerics)();
+extern std::pair<std::string_view, bool> (*program_kernels)();
 
 }  // namespace supertac
 
 int main(int argc, char** argv) {
   using namespace supertac;
-  return run_program({program_name, program_purpose, declare, run, program_numerics}, argc, argv);
+  return run_program({program_name, program_purpose, declare, run, program_kernels}, argc, argv);
 }

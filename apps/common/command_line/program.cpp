@@ -77,11 +77,11 @@ int run(const Program& program, Arguments& arguments) {
   catch_signals();
   check_outputs(arguments);
   begin_provenance(arguments);
-  if (program.numerics != nullptr) {
-    if (const std::string warning = program.numerics().warning; !warning.empty()) {
-      std::cerr << program.name << ": " << warning << '\n';
-    }
-  }
+  if (program.kernels != nullptr && program.kernels().second)
+    std::cerr
+        << program.name +
+               ": this processor has no fused multiply-add: results are the same, but computing takes many "
+               "times longer\n";
   const int code = program.run(arguments);
   if (interrupted()) return 128 + interrupting_signal();
   return code == kExitOk && arguments.displaced() ? kExitFailed : code;
@@ -154,7 +154,9 @@ std::string version() { return SUPERTAC_VERSION; }
 std::string version_text(const Program& program) {
   std::string text = program.name + " " + version() + "\ncommit    " + commit() + "\ncompiler  " + kCompiler +
                      __VERSION__ + "\n";
-  if (program.numerics != nullptr) text += program.numerics().text;
+  if (program.kernels != nullptr)
+    text += "kernels   " + std::string(program.kernels().first) +
+            " (SUPERTAC_ISA=avx512|avx2|neon|portable|plain overrides)\n";
   return text;
 }
 

@@ -6,6 +6,8 @@
 #pragma once
 
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "apps/common/command_line/arguments.h"
 
@@ -13,18 +15,14 @@ namespace supertac {
 
 constexpr int kExitOk = 0, kExitFailed = 1, kExitUsage = 2;
 
-struct Numerics {
-  std::string text;     ///< lines of --version about kernels
-  std::string warning;  ///< one line for stderr when the program runs; empty: nothing to say
-};
-
 struct Program {
   std::string name;     ///< "supertac-simulate"
   std::string purpose;  ///< one sentence for --help
   void (*declare)(Arguments&);
   int (*run)(Arguments&);
-  /// For programs that compute (apps/common/running/numerics.h); nullptr: none.
-  Numerics (*numerics)() = nullptr;
+  /// Of programs that compute: the name of the kernels that were chosen on this processor, and whether they
+  /// do fused multiply-add in software; nullptr: none.
+  std::pair<std::string_view, bool> (*kernels)() = nullptr;
 };
 
 /// The whole of main(): parses, handles --help and --version, sets the number of threads, catches signals,
