@@ -43,4 +43,8 @@ struct LiveState {
   double uncertainty() const { return half_widths.empty() ? 0 : mean_of(half_widths); }
 };
 
+/// Its figures on a terminal: rate, latency, frames lost and dropped, how sure the model is and where the
+/// finger is.
+std::string status_line(const LiveState& state);
+
 }  // namespace supertac

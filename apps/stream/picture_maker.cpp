@@ -41,7 +41,6 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
       input_(network_.first().input_shape(1)),
       output_(network_.estimate(input_)),  // the first run takes memory and chooses kernels
       source_scale_(source.signal_scale()),
-      period_s_(source.period_s()),
       interval_(model_.interval()) {
   features_.resize(signal_feature_count(model_.array(), input_.values().size() / model_.array().signals()));
   for (const float value : output_.picture.values()) {
@@ -52,26 +51,22 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
   }
 }
 
-// A running mean of some kRestS; the first frame begins it.
 void PictureMaker::push(const SensorFrame& frame) {
-  const double share = std::min(1.0, period_s_ / kRestS);
-  resting_.resize(frame.signals.size()), move_.resize(frame.signals.size());
-  const bool first = signals_.empty();
+  move_.resize(frame.signals.size());
   signals_.assign(frame.signals.begin(), frame.signals.end());
   if (const SignalScale& own = model_.input.signal_scale; source_scale_ != own)
     for (float& value : signals_) value = static_cast<float>(source_scale_.in(own, double{value}));
-  for (std::size_t s = 0; s < resting_.size(); ++s)
-    if (std::isfinite(signals_[s]))
-      resting_[s] += (first ? 1 : share) * (static_cast<double>(signals_[s]) - resting_[s]);
   for (std::size_t s = 0; s < signals_.size(); ++s) signals_[s] += move_[s];
   window_.push(frame.time_s, signals_);
 }
 
-void PictureMaker::rezero() {
+void PictureMaker::rezero(std::span<const double> resting) {
   const Scaling& scaling = model_.input.scaling;
   // A rig at rest lies a little below what its scaling calls 0.
   const double rest = scaling.rest == Scaling{}.rest ? rig::kRestVolts : scaling.rest;
-  for (std::size_t s = 0; s < resting_.size(); ++s) move_[s] = static_cast<float>(rest - resting_[s]);
+  move_.clear();
+  for (const double value : resting)
+    move_.push_back(static_cast<float>(rest - source_scale_.in(model_.input.signal_scale, value)));
 }
 
 std::span<const float> PictureMaker::picture() {

@@ -38,9 +38,9 @@ class PictureMaker {
   std::optional<double> distance_limit() const;
   bool unlike_training() const { return distance_ && *distance_ > *distance_limit(); }
 
-  /// Takes what the array has felt in the last moments (kRestS) for "nothing": each signal is moved so that
-  /// it rests where it rested in training, from the next frame on.
-  void rezero();
+  /// Takes these signals, in the source's unit, for "nothing": each is moved so that it rests where it rested
+  /// in training, from the next frame on.
+  void rezero(std::span<const double> resting);
   /// The newest frame as the model takes it: moved by rezero().
   std::span<const float> signals() const { return signals_; }
 
@@ -60,13 +60,10 @@ class PictureMaker {
   Estimate output_;
   std::vector<float> features_;
   SignalScale source_scale_;
-  double period_s_;
   PixelInterval interval_;
   std::vector<float> half_widths_;
   std::optional<double> distance_;
-  static constexpr double kRestS = 0.2;
   std::vector<float> signals_, move_;  // of the newest frame; what rezero() adds
-  std::vector<double> resting_;        // mean of the last frames as they come
 };
 
 }  // namespace supertac

@@ -14,7 +14,9 @@ class RawArray {
  public:
   explicit RawArray(const SensorSource& source);
   void push(std::span<const float> signals);
-  /// What the array has felt in the last moments (kRestS) is its rest from now on.
+  /// What each signal was in the last moments (kRestS), as a mean.
+  const std::vector<double>& resting() const { return newest_mean_; }
+  /// That is its rest from now on.
   void rezero() { rest_ = newest_mean_; }
   /// [rows][columns] in [0,1]: the mean of a taxel's channels, as far in the pressed direction as top() is.
   /// Three axes of a field have no direction: there it is the length of the change.

@@ -27,6 +27,18 @@ double wall_clock_seconds() {
 
 }  // namespace
 
+std::string status_line(const LiveState& state) {
+  const std::string line =
+      format(state.frames_per_s, 0) + " frames/s  latency " + format(state.median_ms, 2) + " ms (p99 " +
+      format(state.p99_ms, 2) + ")  lost " + std::to_string(state.lost) + "  dropped " +
+      std::to_string(state.dropped) +
+      (state.uncertainty() > 0 ? "  +-" + format(state.uncertainty(), 2) : "") +
+      (std::isfinite(state.x_mm) ? "  at x " + format(static_cast<double>(state.x_mm), 1) + " y " +
+                                       format(static_cast<double>(state.y_mm), 1) + " mm"
+                                 : "");
+  return (state.unlike_training ? "UNLIKE TRAINING  " : "") + line;  // in front: never cut
+}
+
 Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models, SensorSource& source)
     : settings_(settings),
       source_(source),
@@ -89,7 +101,7 @@ void Stream::describe_recording() {
 }
 
 void Stream::run() {
-  if (settings_.view) view_ = std::make_unique<TerminalView>();
+  if (settings_.view) view_ = std::make_unique<TerminalLine>();
   while (!interrupted()) {
     const auto frame = source_.next(kWaitS);
     if (frame && !take(*frame)) break;
@@ -222,9 +234,9 @@ bool Stream::take(SensorFrame frame) {
   last_s_ = frame.time_s;
   const bool rezero = web_ && web_->take_rezero();
   raw_.push(frame.signals);
+  if (rezero && maker_) maker_->rezero(raw_.resting());
   if (rezero) raw_.rezero();
   if (order_) order_->push(raw_.loads());
-  if (rezero && maker_) maker_->rezero();
   if (record_ || recorder_ || !maker_) keep_raw(frame);
   if (!maker_) return true;
   maker_->push(frame);
@@ -313,7 +325,7 @@ void Stream::show() {
   if (frames_ > 0)
     state_.taxels = raw_.taxels(), state_.top = raw_.top(), state_.most_changed = raw_.most_changed();
   if (order_) state_.order = order_->status();
-  if (view_) view_->update(state_);
+  if (view_) view_->show(status_line(state_));
   if (web_ && web_->update(state_, map_ ? &*map_ : nullptr, changed_)) changed_ = {};
 }
 

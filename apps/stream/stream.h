@@ -9,13 +9,13 @@
 #include <span>
 #include <string>
 
+#include "apps/common/running/progress.h"
 #include "apps/stream/latency_histogram.h"
 #include "apps/stream/picture_log.h"
 #include "apps/stream/picture_maker.h"
 #include "apps/stream/pressed_order.h"
 #include "apps/stream/raw_array.h"
 #include "apps/stream/views/line_output.h"
-#include "apps/stream/views/terminal_view.h"
 #include "apps/stream/views/web_view.h"
 #include "data/map/elements.h"
 #include "data/map/map_file.h"
@@ -91,7 +91,7 @@ class Stream {
   std::string record_path_, record_remark_;
   std::string about_lines_;
   std::unique_ptr<PictureLog> log_, record_;
-  std::unique_ptr<TerminalView> view_;
+  std::unique_ptr<TerminalLine> view_;
   std::unique_ptr<PipeOutput> pipe_;
   std::unique_ptr<Recorder> recorder_;  // at the page's wish
   std::unique_ptr<PressedOrder> order_;

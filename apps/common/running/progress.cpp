@@ -1,12 +1,12 @@
 #include "apps/common/running/progress.h"
 
+#include <fcntl.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
 #include <cstdlib>
-#include <iostream>
-#include <memory>
 #include <string_view>
 
 #include "apps/common/command_line/arguments.h"
@@ -30,9 +30,38 @@ bool drawable_terminal() {
   return isatty(STDERR_FILENO) == 1 && terminal != nullptr && std::string_view(terminal) != "dumb";
 }
 
-std::size_t terminal_width() {
+// Opened anew: O_NONBLOCK on stderr itself would change it for the shell and everybody else who shares it.
+TerminalLine::TerminalLine()
+    : terminal_(::open("/proc/self/fd/2", O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)) {}
+
+TerminalLine::~TerminalLine() {
+  left_ += "\r" + std::string(width_, ' ') + "\r";
+  (void)send_left();
+  if (terminal_ >= 0) ::close(terminal_);
+}
+
+// A terminal that takes nothing (Ctrl-S, a stuck connection) is left alone, with what it has not taken.
+void TerminalLine::show(std::string line) {
+  if (!send_left()) return;
   winsize size{};
-  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col : 80;
+  const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
+  line.resize(std::min<std::size_t>(line.size(), (known ? size.ws_col : 80) - 1));
+  const std::size_t width = line.size();
+  if (width_ > width) line.append(width_ - width, ' ');
+  width_ = width;
+  left_ = "\r" + line;
+  (void)send_left();
+}
+
+bool TerminalLine::send_left() {
+  while (!left_.empty()) {
+    const ssize_t count = ::write(terminal_, left_.data(), left_.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0 && errno != EAGAIN) left_.clear();  // the terminal is gone
+    if (count <= 0) return false;
+    left_.erase(0, static_cast<std::size_t>(count));
+  }
+  return true;
 }
 
 Progress::Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit,
@@ -45,10 +74,6 @@ Progress::Progress(const Arguments& arguments, std::string what, std::uint64_t t
       begin_(std::chrono::steady_clock::now()),
       last_(begin_) {}
 
-Progress::~Progress() {
-  if (width_ > 0) draw("");
-}
-
 void Progress::update(std::uint64_t done, const std::string& detail, double seconds_left) {
   using namespace std::chrono_literals;
   const auto now = std::chrono::steady_clock::now();
@@ -58,13 +83,8 @@ void Progress::update(std::uint64_t done, const std::string& detail, double seco
   const double seconds = std::chrono::duration<double>(now - begin_).count();
   const double rate = seconds_left > 0 ? static_cast<double>(total_ - done) / seconds_left
                                        : static_cast<double>(done - before_) / seconds;
-  draw(progress_line(what_, done, total_, unit_, rate, detail).substr(0, terminal_width() - 1));
-}
-
-void Progress::draw(const std::string& line) {
-  const std::string rest(width_ > line.size() ? width_ - line.size() : 0, ' ');
-  std::cerr << '\r' << line << rest << (line.empty() ? "\r" : "") << std::flush;
-  width_ = line.size();
+  if (!line_) line_ = std::make_unique<TerminalLine>();
+  line_->show(progress_line(what_, done, total_, unit_, rate, detail));
 }
 
 std::function<void(std::size_t, std::size_t)> progress_of(const Arguments& arguments, const std::string& what,

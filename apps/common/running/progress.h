@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 
 namespace supertac {
@@ -12,34 +13,44 @@ class Arguments;
 
 /// Whether stderr is a terminal that can be drawn on (not TERM=dumb).
 bool drawable_terminal();
-/// Its columns; 80 where it does not say.
-std::size_t terminal_width();
+
+/// A line of stderr, which is such a terminal: shown anew each time, cut to its width, and wiped at the end.
+/// It needs no colour and no escape codes, and a terminal that is slow or not read holds up nobody.
+class TerminalLine {
+ public:
+  TerminalLine();
+  ~TerminalLine();
+  TerminalLine(const TerminalLine&) = delete;
+  TerminalLine& operator=(const TerminalLine&) = delete;
+  void show(std::string line);
+
+ private:
+  /// False when the terminal has not taken everything yet.
+  bool send_left();
+
+  int terminal_;
+  std::string left_;       // not yet taken
+  std::size_t width_ = 0;  // of what is drawn
+};
 
 /// How far a long work is: on a terminal (not TERM=dumb), and not under --quiet, a bar on stderr shows share
-/// done, rate and time left, once the work has taken two seconds; it needs no colour and no escape codes. Not
-/// to be shared by threads.
+/// done, rate and time left, once the work has taken two seconds. Not to be shared by threads.
 class Progress {
  public:
   /// `unit`: what is counted, in the plural ("passes", "steps"). `before`: how many of `total` were done
   /// earlier, by the run that is resumed.
   Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit,
            std::uint64_t before = 0);
-  /// Wipes the bar.
-  ~Progress();
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
 
   /// `done` of `total` so far; `detail` is shown in place of the rate. `seconds_left`: where the caller knows
-  /// better than by the rate. Cheap: draws at most five times a second, cut to the terminal's width.
+  /// better than by the rate. Cheap: draws at most five times a second.
   void update(std::uint64_t done, const std::string& detail = "", double seconds_left = 0);
 
  private:
-  void draw(const std::string& line);
-
   std::string what_, unit_;
   std::uint64_t total_, before_;
   bool drawable_;
-  std::size_t width_ = 0;  // of what is drawn
+  std::unique_ptr<TerminalLine> line_;  // once something is drawn
   std::chrono::steady_clock::time_point begin_, last_;
 };
 

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "apps/stream/latency_histogram.h"
+#include "apps/stream/live_state.h"
 #include "apps/stream/raw_array.h"
-#include "apps/stream/views/terminal_view.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {
@@ -48,12 +48,12 @@ TEST(RawArray, SaysWhichSignalIsFarthestFromItsRest) {
   EXPECT_EQ(most->now, 30);
 }
 
-TEST(TerminalView, SaysWhereTheFingerIsAndThatSignalsAreStrange) {
+TEST(StatusLine, SaysWhereTheFingerIsAndThatSignalsAreStrange) {
   LiveState state;
   state.x_mm = 5.5F, state.y_mm = 62.25F;
   EXPECT_TRUE(status_line(state).ends_with("dropped 0  at x 5.5 y 62.2 mm")) << status_line(state);
   state.unlike_training = true;
-  EXPECT_EQ(status_line(state, 20), "UNLIKE TRAINING  0 f");
+  EXPECT_TRUE(status_line(state).starts_with("UNLIKE TRAINING  0 f"));
 }
 
 }  // namespace

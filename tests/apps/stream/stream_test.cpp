@@ -10,7 +10,6 @@
 #include <filesystem>
 
 #include "apps/stream/stream.h"
-#include "apps/stream/views/terminal_view.h"
 #include "data/recordings/recording.h"
 #include "data/recordings/simulator.h"
 #include "data/windows/windows.h"
