@@ -17,17 +17,12 @@ std::string number(double value) {
   return text;
 }
 
-std::vector<int> indices_of(const Compared& c, std::size_t place) {
-  std::vector<int> at(c.shape.size());
-  for (std::size_t k = at.size(); k-- > 0; place /= static_cast<std::size_t>(c.shape[k]))
-    at[k] = static_cast<int>(place) % c.shape[k];
-  return at;
-}
-
 std::string place_of(const Compared& c, std::size_t place) {
+  if (c.right.size() == 1) return c.name;
   std::string text;
-  for (const int i : indices_of(c, place)) text += (text.empty() ? "" : ",") + std::to_string(i);
-  return c.right.size() == 1 ? c.name : c.name + " [" + text + "]";
+  for (std::size_t k = c.shape.size(); k-- > 0; place /= static_cast<std::size_t>(c.shape[k]))
+    text = std::to_string(place % static_cast<std::size_t>(c.shape[k])) + (text.empty() ? "" : "," + text);
+  return c.name + " [" + text + "]";
 }
 
 double largest_of(const Compared& c) {
@@ -35,8 +30,6 @@ double largest_of(const Compared& c) {
   for (const double e : c.right) largest = std::max(largest, std::abs(e));
   return largest;
 }
-
-bool close(double a, double b, double scale) { return std::abs(a - b) <= 1e-6 * scale; }
 
 // The factor that all wrong entries share, or NaN.
 double common_factor(const Compared& c, const std::vector<std::size_t>& wrong) {
@@ -51,75 +44,12 @@ double common_factor(const Compared& c, const std::vector<std::size_t>& wrong) {
   return factor;
 }
 
-std::string about_factor(double f) {
-  if (f == 0) return "nothing arrives there: is a line missing, or a slope 0?";
-  if (std::abs(f + 1) < 1e-4) return "the sign is turned.";
-  if (std::abs(f - 0.5) < 1e-4)
-    return "half of what it should be: is it set (=) where it should be added (+=), or is a factor 2 "
-           "missing?";
-  if (std::abs(f - 2) < 1e-4) return "twice too large: is a factor 1/2 missing, or is it added twice?";
-  const double n = std::abs(f) > 1 ? f : 1 / f;
-  if (std::abs(n - std::round(n)) < 1e-3)
-    return number(std::abs(n)) + " times too " + (std::abs(f) > 1 ? "large" : "small") +
-           (f < 0 ? ", with the wrong sign" : "") + ": is a factor missing (1/n, a side), or there twice?";
-  return "all by the same factor, " + number(f) + ".";
-}
-
-// Whether the wrong entries are all at the first or the last index of an axis: its name, or nothing.
-std::string edge_of(const Compared& c, const std::vector<std::size_t>& wrong) {
-  for (std::size_t axis = 0; axis < c.shape.size(); ++axis) {
-    const int last = c.shape[axis] - 1;
-    const bool edge = std::ranges::all_of(wrong, [&](std::size_t i) {
-      const int at = indices_of(c, i)[axis];
-      return at == 0 || at == last;
-    });
-    if (edge && last > 1) return std::to_string(axis);
-  }
-  return {};
-}
-
 }  // namespace
-
-std::string cause_of(const Compared& c, const std::vector<std::size_t>& wrong) {
-  const double scale = largest_of(c);
-  const std::size_t n = c.right.size();
-  const bool all = wrong.size() == n;
-  const auto finite = [](double x) { return std::isfinite(x); };
-  if (!std::ranges::all_of(c.yours, finite))
-    return "a number is not finite: a division by 0, or exp of a large one?";
-  if (!c.hint.empty()) return c.hint;
-  if (const double f = common_factor(c, wrong);
-      !std::isnan(f) && (all || n == 1 || wrong.size() > 1 || f != 0))
-    return about_factor(f);
-  std::vector<double> mine = c.yours, right = c.right;
-  std::ranges::sort(mine), std::ranges::sort(right);
-  const bool same_numbers =
-      std::ranges::equal(mine, right, [&](double a, double b) { return close(a, b, scale); });
-  if (same_numbers && n > 1)
-    return "the right numbers in wrong places: are two indices or two axes exchanged?";
-  for (const int shift : {1, -1}) {
-    std::size_t agree = 0;
-    for (std::size_t i = 1; i + 1 < n; ++i)
-      agree += close(c.yours[i], c.right[i + static_cast<std::size_t>(shift)], scale);
-    if (n > 3 && agree + 2 == n)
-      return "everything is one place off: does an index begin or end one too far?";
-  }
-  if (const std::string axis = edge_of(c, wrong); !all && !axis.empty())
-    return "only at the ends of axis " + axis + ": look at the padding, and at where a loop begins and ends.";
-  const auto nothing = [&](std::size_t i) { return c.yours[i] == 0; };
-  if (std::ranges::all_of(wrong, nothing))
-    return "some get nothing at all: does a loop or a condition leave them out?";
-  const double off = c.yours[wrong[0]] - c.right[wrong[0]];
-  const bool constant = std::ranges::all_of(
-      wrong, [&](std::size_t i) { return std::abs(c.yours[i] - c.right[i] - off) < 1e-6 * scale; });
-  if (constant && wrong.size() > 1) return "all are off by the same number, " + number(off) + ".";
-  return "not one factor for all: is a term of the sum missing (= for +=), or another index or value meant?";
-}
 
 std::string finding(const Compared& c, const std::string& from) {
   if (c.yours.size() != c.right.size())
     return c.name + " has " + std::to_string(c.yours.size()) + " entries, " + std::to_string(c.right.size()) +
-           " are expected: look at the shape.";
+           " are expected";
   std::vector<std::size_t> wrong;
   std::size_t worst = 0;
   const double tolerance = 1e-6 * largest_of(c);
@@ -133,9 +63,11 @@ std::string finding(const Compared& c, const std::string& from) {
     wrong.push_back(i);
   }
   if (wrong.empty()) return {};
+  const double factor = common_factor(c, wrong);
   return place_of(c, worst) + ": yours " + number(c.yours[worst]) + ", " + from + " " +
          number(c.right[worst]) + " (" + std::to_string(wrong.size()) + " of " +
-         std::to_string(c.right.size()) + " entries are wrong): " + cause_of(c, wrong);
+         std::to_string(c.right.size()) + " entries are wrong" +
+         (std::isnan(factor) ? "" : ", by the factor " + number(factor)) + ")";
 }
 
 void Report::add(const std::string& what, const Compared& array, const std::string& from) {
@@ -165,14 +97,7 @@ void Report::gradients(const std::string& what, const std::vector<std::string>& 
   gradients(what, arrays);
 }
 
-void Report::gradients(const std::string& what, std::vector<Compared> arrays) {
-  const auto as = [](const Compared& mine, const Compared& other) {
-    return finding({"", {}, mine.yours, other.right}, "").empty();
-  };
-  for (Compared& mine : arrays)
-    for (const Compared& other : arrays)
-      if (&mine != &other && !as(mine, mine) && as(mine, other) && as(other, mine))
-        mine.hint = "these are the numbers of " + other.name + ": are the two exchanged?";
+void Report::gradients(const std::string& what, const std::vector<Compared>& arrays) {
   for (const Compared& c : arrays) add(what, c, "differences give");
 }
 
