@@ -8,7 +8,6 @@
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
-#include "apps/train/ledger_file.h"
 #include "apps/train/run_folder.h"
 #include "apps/train/training_options.h"
 #include "data/recordings/recording.h"
@@ -18,6 +17,7 @@
 #include "io/numbers/hash.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
+#include "models/training/audit/ledger.h"
 #include "models/training/audit/opened_step.h"
 
 namespace supertac {

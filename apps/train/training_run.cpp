@@ -8,11 +8,11 @@
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
-#include "apps/train/ledger_file.h"
 #include "apps/train/run_folder.h"
 #include "apps/train/training_options.h"
 #include "data/recordings/recording.h"
 #include "io/numbers/numbers.h"
+#include "models/training/audit/ledger.h"
 
 namespace supertac {
 namespace {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "data/scores/ridge.h"
 #include "data/windows/split.h"
 
 namespace supertac {

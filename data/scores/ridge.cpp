@@ -1,4 +1,4 @@
-#include "data/scores/ridge.h"
+#include "data/scores/baselines.h"
 
 #include <algorithm>
 #include <cmath>
@@ -57,15 +57,7 @@ void add_rows(double* y, std::size_t count, double sign, const double* rows, std
 
 constexpr std::size_t kBlock = 64;  // windows whose features stay in the cache; rows between two looks
 
-// How many of the blocks of a whole fit are done.
-struct Fit {
-  const FitProgress& progress;
-  std::size_t done = 0, all = 0;
-  void block() {
-    ++done;
-    if (progress) progress(done, all);
-  }
-};
+using Look = std::function<void()>;  // once a block
 
 std::size_t blocks_of(std::size_t count) { return (count + kBlock - 1) / kBlock; }
 
@@ -76,12 +68,12 @@ struct Moments {
   std::vector<double> xx, xy;
   double yy = 0;
 
-  Moments(const WindowSet& windows, std::span<const std::uint32_t> indices, Fit& fit)
+  Moments(const WindowSet& windows, std::span<const std::uint32_t> indices, const Look& look)
       : features(features_of(windows.frames(), windows.array().signals())),
         pixels(windows.image().pixels()),
         xx(features * features),
         xy(features * pixels) {
-    for (std::size_t first = 0; first < indices.size(); first += kBlock, fit.block())
+    for (std::size_t first = 0; first < indices.size(); first += kBlock, look())
       add(windows, indices.subspan(first, std::min(kBlock, indices.size() - first)));
   }
 
@@ -112,7 +104,7 @@ struct Moments {
   }
 
   // W [f][pixels], from U'U W = X'Y with the Cholesky factor U of X'X and the penalty
-  std::vector<double> solve(double penalty, Fit& fit) const {
+  std::vector<double> solve(double penalty, const Look& look) const {
     const std::size_t n = features, p = pixels;
     double mean = 0;
     for (std::size_t i = 0; i + 1 < n; ++i) mean += xx[i * (n + 1)] / static_cast<double>(n - 1);
@@ -127,22 +119,22 @@ struct Moments {
       for (std::size_t j = i; j < n; ++j) row[j] *= scale;
       add_rows(&w[i * p], p, -1, w.data(), p, &u[i], n, i);
       for (std::size_t j = 0; j < p; ++j) w[i * p + j] /= row[i];
-      if (i % kBlock == 0) fit.block();
+      if (i % kBlock == 0) look();
     }
     for (std::size_t i = n; i-- > 0;) {
       const double* row = &u[i * n];
       add_rows(&w[i * p], p, -1, w.data() + (i + 1) * p, p, row + i + 1, 1, n - 1 - i);
       for (std::size_t j = 0; j < p; ++j) w[i * p + j] /= row[i];
-      if (i % kBlock == 0) fit.block();
+      if (i % kBlock == 0) look();
     }
     return w;
   }
 
   // |Y - X W|^2
-  double error(const std::vector<double>& w, Fit& fit) const {
+  double error(const std::vector<double>& w, const Look& look) const {
     const std::size_t n = features, p = pixels;
     std::vector<double> product(w.size());
-    for (std::size_t first = 0; first < n; first += kBlock, fit.block()) {
+    for (std::size_t first = 0; first < n; first += kBlock, look()) {
 #pragma omp parallel for
       for (std::size_t i = first; i < std::min(n, first + kBlock); ++i) {
         add_rows(&product[i * p], p, 1, w.data(), p, &xx[i], n, i);
@@ -157,45 +149,44 @@ struct Moments {
   }
 };
 
-// Which windows judge the penalty: whole passes, since neighbours of one pass are nearly the same.
-std::vector<bool> held_out(const WindowSet& windows, std::span<const std::uint32_t> indices) {
-  std::vector<std::size_t> passes;
-  for (const std::uint32_t i : indices) {
-    if (passes.empty() || passes.back() != windows.pass_of(i)) passes.push_back(windows.pass_of(i));
-  }
-  std::vector<bool> held(indices.size());
-  for (std::size_t n = 0; n < indices.size(); ++n) {
-    const auto at = std::find(passes.begin(), passes.end(), windows.pass_of(indices[n])) - passes.begin();
-    held[n] = passes.size() == 1
-                  ? n >= indices.size() - indices.size() / kHeldOut
-                  : static_cast<std::size_t>(at) % kHeldOut == std::min(kHeldOut, passes.size()) - 1;
-  }
-  return held;
-}
-
 }  // namespace
 
 Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train, const FitProgress& progress)
     : timesteps_(windows.frames()), signals_(windows.array().signals()), pixels_(windows.image().pixels()) {
   if (train.empty()) throw std::invalid_argument("ridge: there is no window to fit to");
   const std::vector<std::uint32_t> chosen = evenly_spaced(train, kFitWindows);
-  const std::vector<bool> held = held_out(windows, chosen);
+  // Whole passes judge the penalty, since neighbours of one pass are nearly the same.
+  const auto begins_pass = [&](std::size_t n) {
+    return n > 0 && windows.pass_of(chosen[n]) != windows.pass_of(chosen[n - 1]);
+  };
+  std::size_t passes = 1, pass = 0;
+  for (std::size_t n = 0; n < chosen.size(); ++n) passes += begins_pass(n) ? 1 : 0;
   std::vector<std::uint32_t> fit, judge;
-  for (std::size_t n = 0; n < chosen.size(); ++n) (held[n] ? judge : fit).push_back(chosen[n]);
+  for (std::size_t n = 0; n < chosen.size(); ++n) {
+    pass += begins_pass(n) ? 1 : 0;
+    const bool held = passes == 1 ? n >= chosen.size() - chosen.size() / kHeldOut
+                                  : pass % kHeldOut == std::min(kHeldOut, passes) - 1;
+    (held ? judge : fit).push_back(chosen[n]);
+  }
   const std::size_t rows = blocks_of(features_of(timesteps_, signals_));
-  Fit looks{progress};
-  looks.all = blocks_of(fit.size()) + blocks_of(judge.size()) + (3 * std::size(kPenalties) + 2) * rows;
-  Moments moments(windows, fit, looks);
-  const Moments other(windows, judge, looks);
+  const std::size_t all =
+      blocks_of(fit.size()) + blocks_of(judge.size()) + (3 * std::size(kPenalties) + 2) * rows;
+  std::size_t done = 0;
+  const Look look = [&] {
+    ++done;
+    if (progress) progress(done, all);
+  };
+  Moments moments(windows, fit, look);
+  const Moments other(windows, judge, look);
   double least = 0;
   for (const double penalty : kPenalties) {
-    const double error = other.error(moments.solve(penalty, looks), looks);
+    const double error = other.error(moments.solve(penalty, look), look);
     if (penalty_ == 0 || error < least) {
       penalty_ = penalty;
       least = error;
     }
   }
-  const std::vector<double> w = (moments += other).solve(penalty_, looks);
+  const std::vector<double> w = (moments += other).solve(penalty_, look);
   weights_.assign(w.begin(), w.end());
 }
 

@@ -17,22 +17,12 @@ namespace {
 constexpr std::size_t kTestedPerEpoch = 2000;
 constexpr std::int64_t kStepsPerLine = 50;
 
-void test(const Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop,
-          LogLine& line) {
-  const Metrics contact = score(Ensemble({CompiledModel(trainer.model())}), *task.windows,
-                                evenly_spaced(task.split.test, kTestedPerEpoch), stop)
-                              .contact();
-  if (contact.windows == 0) return;
-  line.test_ssim = contact.ssim;
-  line.test_psnr_db = contact.psnr_mean_db;
-}
-
-// What the networks of a training are chosen by.
-double score_of(const Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop) {
-  return score(Ensemble({CompiledModel(trainer.model())}), *task.windows,
-               evenly_spaced(task.held_out, kTestedPerEpoch), stop)
-      .contact()
-      .ssim;
+// Of the windows in contact among some of these.
+Metrics scores_of(const Trainer& trainer, const std::vector<std::uint32_t>& windows,
+                  const std::function<bool()>& stop) {
+  return score(Ensemble({CompiledModel(trainer.model())}), trainer.windows(),
+               evenly_spaced(windows, kTestedPerEpoch), stop)
+      .contact();
 }
 
 // Of an even sample of the training examples, as they are: augmentation hides what is to be noticed.
@@ -99,11 +89,15 @@ bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& 
       sums.time_s = callbacks.seconds_before +
                     std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       sums.step = report.step, sums.learning_rate = report.learning_rate;
-      if (epoch_ends) test(trainer, task, callbacks.stop, sums);
+      if (epoch_ends) {
+        const Metrics test = scores_of(trainer, task.split.test, callbacks.stop);
+        if (test.windows > 0) sums.test_ssim = test.ssim, sums.test_psnr_db = test.psnr_mean_db;
+      }
       callbacks.log(std::exchange(sums, {}));
       steps = 0;
     }
-    if (epoch_ends && !task.held_out.empty()) trainer.epoch_scored(score_of(trainer, task, callbacks.stop));
+    if (epoch_ends && !task.held_out.empty())
+      trainer.epoch_scored(scores_of(trainer, task.held_out, callbacks.stop).ssim);
     if (report.step % callbacks.checkpoint_every == 0) save();
     stop = report.stop || (callbacks.stop && trainer.ranks() == 1 && callbacks.stop());
   }

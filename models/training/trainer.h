@@ -135,7 +135,6 @@ class Trainer {
   // In training_state.cpp:
   double apply();
   void add_up_over_ranks();
-  // In step_statistics.cpp:
   void add_up_statistics(StepReport& report);
   void look_for_collapse(StepReport& report);
   void check_finite(const LossTerms& terms) const;

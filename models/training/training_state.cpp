@@ -10,7 +10,7 @@
 #include "autograd/kernels/fast/each.h"
 #include "io/numbers/numbers.h"
 #include "layers/checkpoint.h"
-#include "models/training/loss/diagnosis.h"
+#include "models/training/loss/collapse.h"
 #include "models/training/trainer.h"
 
 namespace supertac {

@@ -2,10 +2,7 @@
 
 #include <algorithm>
 
-#include "autograd/kernels/fast/geometry.h"
 #include "autograd/kernels/fast/isa/isa.h"
-#include "autograd/kernels/fast/narrow.h"
-#include "autograd/kernels/fast/winograd.h"
 
 namespace supertac::kernels::fast {
 namespace {

@@ -1,9 +1,9 @@
 // The same sums as autograd/kernels/conv.h and autograd/ops/linear.h, faster: register tiles, instruction
-// sets chosen at run time, Winograd's algorithm for batches of larger maps (winograd.h), another one for few
-// output channels (narrow.h). The shapes alone decide which one runs, so all processors agree.
+// sets chosen at run time, Winograd's algorithm for batches of larger maps, another one for few
+// output channels. The shapes alone decide which one runs, so all processors agree.
 #pragma once
 
-#include "autograd/kernels/conv.h"
+#include "autograd/kernels/fast/geometry.h"
 
 namespace supertac::kernels::fast {
 
@@ -22,3 +22,29 @@ void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, I
 Tensor transposed_weights(const real* w, Dim taps, Dim cin, Dim cout);
 
 }  // namespace supertac::kernels::fast
+
+namespace supertac::kernels {
+
+// In narrow.cpp:
+/// Whether conv() and its gradients take this way: fewer than half as many outputs as inputs, taps * outputs
+/// that fit a vector of 16, and kernels three wide and an odd number high that keep the size of a map. The
+/// shapes alone decide, so that all processors agree.
+bool is_narrow(const ConvTask& task);
+
+void narrow_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,
+                 real* y);
+void narrow_grad_x(const ConvTask& task, const real* gy, const real* w, Into into, real* gx);
+void narrow_grad_w(const ConvTask& task, const real* x, const real* gy, Into into, real* gw);
+
+// In winograd.cpp:
+/// Whether conv() and its gradients take this way: four images or more, of four 4x4 squares or more (8x8,
+/// 4x16), channels multiples of 16. Elsewhere the transforms cost more than the products save. The shapes
+/// alone decide, so that all processors agree.
+bool is_winograd(const ConvTask& task);
+
+void winograd_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,
+                   real* y);
+void winograd_grad_x(const ConvTask& task, const real* gy, const real* w, Into into, real* gx);
+void winograd_grad_w(const ConvTask& task, const real* x, const real* gy, Into into, real* gw);
+
+}  // namespace supertac::kernels

@@ -1,10 +1,16 @@
-#include "autograd/kernels/fast/narrow.h"
+// Convolutions with few outputs (the picture's single channel, a decoder's four taxels).
+//
+// The gather kernel puts output channels side by side in a vector; with one channel it would leave 15 of 16
+// lanes empty. Here taps and output channels together fill the vector:
+//   z[p, t, o] = sum over cin of x[p, :] * w[t, :, o]        one matrix product
+//   y[q, o]    = bias[o] + sum over taps t of z[q + t, t, o]
+// The gradients are one product each with gz[p, t, o] = gy[p - t, o].
+#include "autograd/kernels/fast/conv.h"
 
 #include <algorithm>
 #include <cstring>
 #include <utility>
 
-#include "autograd/kernels/fast/conv.h"
 #include "autograd/kernels/fast/isa/isa.h"
 
 namespace supertac::kernels {

@@ -1,10 +1,12 @@
-// How a network fails in silence: it stops to look at its input, or blows up, while the loss stays finite.
+// How a network fails in silence, when it stops to look at its input or blows up while the loss stays finite;
+// and where in the network it began, when the loss is not finite.
 #pragma once
 
 #include <span>
+#include <string>
 #include <vector>
 
-#include "autograd/tensor.h"
+#include "layers/module.h"
 
 namespace supertac {
 
@@ -36,5 +38,14 @@ bool is_degenerate(const BatchVariance& pictures, const BatchVariance& truths, d
 /// Latent numbers that tell windows apart: the variance of the encoder's mean over the batch is above 0.01
 /// (Burda et al. 2016, section 5.1, "active units"). None is posterior collapse: the decoders ignore z.
 int active_latents(const BatchVariance& means, double samples);
+
+/// The first value in the order of computation that is not finite, in words: "parameter upsampler.out.bias is
+/// not finite", "an input of conv1d in encoder.0.conv.0 is not finite" or "the output of conv2d in
+/// upsampler.rirb.0.conv is the first that is not finite". An op without parameters is said to be behind the
+/// last layer before it. Empty when all values of the loss's graph are finite, or backward() has freed them.
+std::string where_not_finite(const Variable& loss, const std::vector<Parameter>& parameters);
+
+/// The parameter nearest to the loss whose gradient is not finite, its name; empty when all are.
+std::string gradient_not_finite(const std::vector<Parameter>& parameters);
 
 }  // namespace supertac

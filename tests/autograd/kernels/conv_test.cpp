@@ -2,9 +2,8 @@
 // set: the sets have the same bytes, and those of the plain loops where both add in the same order.
 #include "autograd/kernels/conv.h"
 
+#include "autograd/kernels/fast/conv.h"
 #include "autograd/kernels/fast/isa/isa.h"
-#include "autograd/kernels/fast/narrow.h"
-#include "autograd/kernels/fast/winograd.h"
 #include "autograd/ops/linear.h"
 #include "tests/autograd/check.h"
 

@@ -1,4 +1,4 @@
-#include "data/scores/ridge.h"
+#include "data/scores/baselines.h"
 
 #include <gtest/gtest.h>
 #include <omp.h>

@@ -34,7 +34,7 @@ struct OuterJob {
   Dim images = 0, in_pixels = 0, out_pixels = 0, cin = 0, cout = 0;
   Into into = Into::add;
 };
-/// Tiles of 4x4 outputs for Winograd's transforms (winograd.h), numbered through a batch from `first`
+/// Tiles of 4x4 outputs for Winograd's transforms (winograd.cpp), numbered through a batch from `first`
 /// on, `count` of them. Place (i, j) of the k-th of them is places[(6 i + j) * step + k * channels + c].
 struct TileJob {
   const std::int32_t* pixels = nullptr;  // of one image: [tiles][36] of patches or [tiles][16] of squares

@@ -1,4 +1,4 @@
-// Winograd's transforms (winograd.h), over the same vector type as kernels.inl and included behind it.
+// Winograd's transforms (winograd.cpp), over the same vector type as kernels.inl and included behind it.
 
 // For the points 0, 1, -1, 2, -2 and infinity, one dimension of each; both_ways() applies them to rows, then
 // columns. kFirst: the first place.

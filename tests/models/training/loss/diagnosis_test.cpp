@@ -1,4 +1,4 @@
-#include "models/training/loss/diagnosis.h"
+#include "models/training/loss/collapse.h"
 
 #include <gtest/gtest.h>
 
