@@ -41,10 +41,7 @@ class EvaluationPage {
   /// Of all groups, or of one.
   std::vector<ScoredWindow> extremes(bool best, const std::string& group = {},
                                      std::size_t most = kShown) const;
-  std::string by_group(const nlohmann::ordered_json& groups) const;
-  std::string shown(const std::string& title, const std::string& note,
-                    const std::vector<ScoredWindow>& chosen,
-                    const std::map<std::uint32_t, ShownWindow>& pictures) const;
+  nlohmann::ordered_json shown(const std::vector<ScoredWindow>& chosen, const Ensemble& network) const;
   std::string name_of(std::uint32_t window) const;
 
   const WindowSet& windows_;

@@ -7,7 +7,6 @@
 #include <sstream>
 #include <utility>
 
-#include "apps/web/chart.h"
 #include "apps/web/result_page.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
@@ -59,64 +58,6 @@ std::vector<LogLine> read_log(const std::string& path, std::int64_t last_step) {
   return lines;
 }
 
-using Value = std::optional<double> (*)(const LogLine&);
-
-ChartSeries curve(const char* name, const std::vector<LogLine>& lines, Value value) {
-  ChartSeries series{.name = name, .points = {}};
-  for (const LogLine& line : lines)
-    if (const auto y = value(line)) series.points.emplace_back(static_cast<double>(line.step), *y);
-  series.dots = series.points.size() < 40;
-  return series;
-}
-
-// Training and test in one plot; again as the distance from 1 on logarithmic axes, where late gains show.
-std::string learning_curves(const std::vector<LogLine>& lines) {
-  const ChartAxis step{.label = "step"};
-  const auto logarithmic = [](const char* label) { return ChartAxis{.label = label, .logarithmic = true}; };
-  return "<div class=\"two\">" +
-         chart_svg("SSIM, linear axes", step, {.label = "SSIM", .most = 1},
-                   {curve("training pictures", lines, [](const LogLine& l) { return std::optional(l.ssim); }),
-                    curve("test pictures in contact", lines, [](const LogLine& l) { return l.test_ssim; })}) +
-         chart_svg(
-             "1 - SSIM, logarithmic axes", logarithmic("step"), logarithmic("1 - SSIM"),
-             {curve("training pictures", lines, [](const LogLine& l) { return std::optional(1 - l.ssim); }),
-              curve("test pictures in contact", lines,
-                    [](const LogLine& l) {
-                      return l.test_ssim ? std::optional(1 - *l.test_ssim) : std::nullopt;
-                    })}) +
-         "</div>";
-}
-
-struct Other {
-  const char* title;
-  Value value;
-  bool logarithmic;
-};
-constexpr Other kOthers[] = {
-    {"Loss", [](const LogLine& l) { return std::optional(l.total); }, true},
-    {"Mean squared error of the pictures", [](const LogLine& l) { return std::optional(l.l2); }, true},
-    {"Reconstruction error of the VAEs", [](const LogLine& l) { return std::optional(l.reconstruction); },
-     true},
-    {"Kullback-Leibler divergence", [](const LogLine& l) { return std::optional(l.kld); }, false},
-    {"PSNR of test pictures in contact, dB", [](const LogLine& l) { return l.test_psnr_db; }, false},
-    {"Gradient norm before clipping", [](const LogLine& l) { return std::optional(l.gradient_norm); }, true}};
-
-// One page with the learning curves, on linear and logarithmic axes, and the other curves of a run; it loads
-// nothing from elsewhere.
-std::string report_page(const std::vector<LogLine>& lines) {
-  std::string others;
-  for (const Other& other : kOthers)
-    others += chart_svg(other.title, {.label = "step"}, {.label = "", .logarithmic = other.logarithmic},
-                        {curve("", lines, other.value)});
-  return result_page(
-      "SuperTac training",
-      page_section("Learning curves",
-                   "training pictures are augmented and of whole passes, test pictures those in contact",
-                   learning_curves(lines)) +
-          page_section("Other curves", "means over the steps since the point before",
-                       "<div class=\"two\">" + others + "</div>"));
-}
-
 }  // namespace
 
 std::string RunFolder::folder_of(const std::string& model_file) {
@@ -159,6 +100,10 @@ bool RunFolder::log(const LogLine& line) {
   return !log_broken_;
 }
 
-void RunFolder::write_report() const { write_file(path_ + "/report.html", report_page(lines_)); }
+void RunFolder::write_report() const {
+  std::string log = kHeader;
+  for (const LogLine& line : lines_) log += csv(line);
+  write_file(path_ + "/report.html", result_page({{"title", "SuperTac training"}, {"log", log}}));
+}
 
 }  // namespace supertac

@@ -10,7 +10,7 @@ std::string_view live_page();
 std::string_view collect_page();
 /// GET /link.js of both: how they hear of their program.
 std::string_view link_script();
-/// Of results, with <!--title--> and <!--content--> where these stand: see result_page.h.
+/// Of results, with <!--data--> where their JSON stands: see result_page.h.
 std::string_view report_page_frame();
 
 }  // namespace supertac

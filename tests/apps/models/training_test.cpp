@@ -134,8 +134,7 @@ TEST_F(Training, LikeRepeatsATrainingToTheSameContent) {
 TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   trained("scored.safetensors");
   const std::string page = bytes("scored.run/report.html");
-  for (const char* part : {"SSIM, linear axes", "1 - SSIM, logarithmic axes", "test pictures in contact"})
-    EXPECT_TRUE(contains(page, part));
+  EXPECT_TRUE(contains(page, "\"log\":\"time_s,step,total,"));
   for (const char* outside : {"http://", "https://", "<!--", "{{"}) EXPECT_FALSE(contains(page, outside));
   succeed(
       "supertac-evaluate --model scored.safetensors --data data --json scores.json --outputs "

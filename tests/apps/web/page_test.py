@@ -405,6 +405,34 @@ def check_page(binaries, folder, browser, screenshots):
         again.stop()
 
 
+def check_reports(binaries, folder, browser):
+    """The pages of an evaluation and of a training: tables of their numbers, pictures, and charts with round numbers."""
+    evaluate = ["--model", "model.safetensors", "--data", "data", "--limit", "500", "--report", "report.html", "--json", "scores.json"]
+    subprocess.run([binaries / "supertac-evaluate", *evaluate, "--quiet"], check=True, stdout=subprocess.DEVNULL, cwd=folder)
+    scores = json.loads((folder / "scores.json").read_text())
+    browser.open((folder / "report.html").as_uri())
+    rows = browser.js("return Array.from(document.querySelectorAll('tr'), row => Array.from(row.cells, c => c.textContent))")
+    ridge = next(row for row in rows if row[0] == "ridge")
+    for column, zone in ((1, "contact"), (4, "all")):
+        assert ridge[column] == f"{scores['baselines']['ridge'][zone]['ssim']:.3f}", ridge
+    shown = "return Array.from(document.querySelectorAll('canvas'), c => [c.getAttribute('aria-label').split(', ')[0], c.width])"
+    pictures = browser.js(shown)
+    assert len(pictures) == 4 * 24 and pictures[:4] == [["felt", 4], ["drawn", 16], ["true", 16], ["difference", 16]], pictures[:5]
+    browser.open((folder / "model.run/report.html").as_uri())
+    titles = browser.js("return Array.from(document.querySelectorAll('svg'), svg => svg.getAttribute('aria-label'))")
+    assert titles[:2] == ["SSIM, linear axes", "1 - SSIM, logarithmic axes"], titles
+    assert browser.js("return ticks(0.61, 1)") == [0.7, 0.8, 0.9, 1]
+    assert browser.js("return ticks(0.002, 0.3, true)") == [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2]
+    assert len(browser.js("return ticks(1e-9, 1e9, true)")) <= 8
+    points = "[[0, .01], [1, .1], [2, 1], [3, -1], [4, NaN]]"
+    svg = browser.js(f"return chart('', {{label: ''}}, {{logarithmic: true}}, {{a: {points}}})")
+    heights = [float(pair.split(",")[1]) for pair in re.search('points="([^"]*)"', svg)[1].split()]
+    assert len(heights) == 3 and heights[0] > heights[1], heights
+    assert abs((heights[0] - heights[1]) - (heights[1] - heights[2])) < 0.21, "equal factors are equal steps"
+    assert ">1.1<" not in browser.js("return chart('', {label: ''}, {most: 1}, {a: [[0, .5], [9, .99]]})")
+    assert browser.js("return chart('', {label: ''}, {logarithmic: true}, {a: [[0, 0]]})") == ""
+
+
 def main():
     binaries = pathlib.Path(sys.argv[1]).resolve()
     screenshots = pathlib.Path(sys.argv[2]).resolve() if len(sys.argv) > 2 else None
@@ -424,6 +452,7 @@ def main():
             check_elements(binaries, folder, browser, screenshots)
             check_probe(binaries, folder, browser, screenshots)
             check_order(binaries, folder, browser, screenshots)
+            check_reports(binaries, folder, browser)
     print("the page does what it says")
     return 0
 
