@@ -99,18 +99,6 @@ TEST_F(Streaming, StoppedForAWhileItRecordsWhatItCanDate) {
   }
 }
 
-TEST_F(Streaming, PortsThatAreNotABoardAreNamed) {
-  expect_failure(stream("--board nowhere"), 1, "no such port");
-  write_file(path("file"), "not a port");
-  expect_failure(stream("--board file"), 1, "expected a serial port");
-  RigSettings settings = touching_rig();
-  settings.printer.heartbeat = true;
-  plug_in(settings);
-  const SerialPort first(board());
-  expect_failure(stream("--board " + board()), 1, "already open, by another program");
-  expect_exit(stream("--board printer"), 1, "expected");
-}
-
 TEST_F(Streaming, ASignalEndsItCleanly) {
   plug_in();
   for (const int signal : {SIGINT, SIGTERM}) {

@@ -36,22 +36,6 @@ TEST(Truth, RowsGrowWithYAndColumnsWithX) {
   EXPECT_EQ(image[12 * 9 + 3], 0.0F);   // mirrored in x
 }
 
-TEST(Truth, EverySizeCoversTheSameTwelveMillimetres) {
-  for (int size : {8, 16, 32}) {
-    const auto image = image_at(one_blob(), 15, 50, size);
-    const double pixel = 12.0 / size;
-    double sum = 0, row = 0, column = 0;
-    for (int r = 0; r < size; ++r)
-      for (int c = 0; c < size; ++c) {
-        const double v = image[static_cast<std::size_t>(size * r + c)];
-        sum += v, row += v * (r + 0.5) * pixel, column += v * (c + 0.5) * pixel;
-      }
-    EXPECT_NEAR(row / sum, 10, 0.1) << size;                                       // 54 - (50 - 6)
-    EXPECT_NEAR(column / sum, 9, 0.1) << size;                                     // 18 - (15 - 6)
-    EXPECT_NEAR(sum * pixel * pixel, 2.0 / 3 * 3.14159 * 1.5 * 1.5, 0.5) << size;  // volume / height
-  }
-}
-
 TEST(Truth, IsZeroOnTheFlatPlateAndOneOnTopOfEveryPlate) {
   const Plate waves = Plate::named("4_Waves"), bumps = Plate::named("3_Bumps");
   EXPECT_NEAR(truth_value(waves, 5, 40.5), 1, 1e-12);
@@ -77,16 +61,6 @@ TEST(Truth, TellsContactFromNearAndFlat) {
   EXPECT_EQ(zone_of(bumps, 18, 30, grid), Zone::flat);
   EXPECT_EQ(zone_of(bumps, 18, 78, grid), Zone::flat);
   EXPECT_EQ(zone_of(Plate::named("plain"), 18, 54, grid), Zone::flat);
-}
-
-TEST(Truth, ThreeMillimetresAroundThePictureAreNear) {
-  const Plate plate = Plate::named("3_Bumps");
-  const auto first = [&](Zone zone) {
-    double y = 0;
-    while (zone_of(plate, 18, y, ImageGrid()) != zone && y < 60) y += 0.05;
-    return y;
-  };
-  EXPECT_NEAR(first(Zone::contact) - first(Zone::near), 3, 0.3);
 }
 
 // Pixels need not be square.

@@ -78,23 +78,5 @@ TEST(ApplyRegistration, PositionsAreLimitedToThePlateAndToWhatWasFitted) {
   EXPECT_EQ(r.metadata.at("registration_reliable"), "no");
 }
 
-TEST(ApplyRegistration, ALossInTheMiddleKeepsBothPartsOnOneLine) {
-  const Recording before = like_the_rig("6_Bumps", 4, 3);
-  Registration r = register_pass(before, Plate::named("6_Bumps"));
-  const std::size_t at = 5000, lost = 243;
-  r.lost_at_s = before.time_s[at];
-  r.lost_s = static_cast<double>(lost) / kLineHz;
-  Recording after = before;
-  apply(r, after);
-  ASSERT_EQ(after.frames(), before.frames() + lost);
-  for (std::size_t i = 1; i < after.frames(); ++i) ASSERT_GT(after.time_s[i], after.time_s[i - 1]) << i;
-  for (std::size_t i = 0; i < lost; ++i) EXPECT_TRUE(std::isnan(after.position_mm[2 * (at + i) + 1]));
-  for (const std::size_t i : {at - 1, at}) {  // one straight line in the new stamps
-    const std::size_t now = i < at ? i : i + lost;
-    EXPECT_NEAR(after.position_mm[2 * now + 1], r.start_mm + r.rate * after.time_s[now], 1e-4);
-    EXPECT_EQ(after.signals[now * kTaxels], before.signals[i * kTaxels]);
-  }
-}
-
 }  // namespace
 }  // namespace supertac

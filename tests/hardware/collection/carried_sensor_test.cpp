@@ -309,24 +309,5 @@ TEST(CarriedSensor, NothingMovesBeforeItIsHeard) {
   EXPECT_EQ(run.folder.entries(), 0U) << "a journal of nothing was left behind";
 }
 
-TEST(CarriedSensor, OneThatGoesAwayInContactEndsWithTheFingerUp) {
-  CarriedSensor run(mat(true));
-  run.settings.progress = [&](const Leg& leg, const Point3& at, const ReaderCounters& counters) {
-    EXPECT_GT(counters.decoder.frames, 0U);
-    if (leg.phase == Phase::slide && at.y > 530) run.rig.unplug_board();
-  };
-  const RecorderReport report = run.record();
-  EXPECT_ERROR(std::rethrow_exception(report.outcome.error), PortUnplugged, "check the cable");
-  EXPECT_EQ(report.outcome.finger, PalpationOutcome::Finger::lifted);
-  EXPECT_GT(run.rig.world().printer().head(run.rig.now()).z, 24.9);
-}
-
-TEST(CarriedSensor, APlanThatLeavesTheBedIsRefused) {
-  CarriedSensor run(mat(true));
-  run.settings.bed.limits.high.y = 560;
-  EXPECT_ERROR((void)run.record(), OutsideLimits, "Y expected 400.00 to 560.00 mm, found 570.00");
-  EXPECT_TRUE(moves_of(run.rig.world().printer()).empty());
-}
-
 }  // namespace
 }  // namespace supertac

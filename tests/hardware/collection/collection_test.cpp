@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
-
 #include "hardware/collection/capture.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/ports/errors.h"
@@ -83,38 +81,6 @@ TEST(Collection, WhatWasSetIsPutBackWhereverTheRunEnds) {
     EXPECT_EQ(bench.rig.world().printer().left_over().speed_percent, 150);
     EXPECT_TRUE(moves_of(bench.rig.world().printer()).empty());
   }
-}
-
-TEST(Collection, ABoardThatGoesAwayInContactEndsWithTheFingerUp) {
-  CollectionBench bench(running_rig());
-  bench.settings.bed.plan.passes = 2;
-  bench.settings.progress = [&](const Leg& leg, const Point3& at, const ReaderCounters&) {
-    if (leg.phase == Phase::slide && at.y > 120) bench.rig.unplug_board();
-  };
-  const RecorderReport report = bench.record();
-  EXPECT_FALSE(report.outcome.complete);
-  EXPECT_EQ(report.outcome.finger, PalpationOutcome::Finger::lifted);
-  EXPECT_ERROR(std::rethrow_exception(report.outcome.error), PortUnplugged,
-               "check the cable and start again");
-  EXPECT_GT(bench.rig.world().printer().head(bench.rig.now()).z, 96);
-  const Collection kept = bench.collect();
-  EXPECT_FALSE(kept.complete);
-  ASSERT_EQ(kept.passes.size(), 1U);
-  EXPECT_FALSE(kept.passes[0].complete);
-  EXPECT_GT(kept.passes[0].time_s.size(), 1000U);
-}
-
-TEST(Collection, TheOperatorsStopLiftsTheFinger) {
-  CollectionBench bench(running_rig());
-  std::atomic<bool> stop{false};
-  bench.settings.stop = [&stop] { return stop.load(); };
-  bench.settings.progress = [&](const Leg& leg, const Point3& at, const ReaderCounters&) {
-    if (leg.phase == Phase::slide && at.y > 120) stop = true;
-  };
-  const RecorderReport report = bench.record();
-  EXPECT_ERROR(std::rethrow_exception(report.outcome.error), OperatorStop, "stopped by the operator");
-  EXPECT_EQ(report.outcome.finger, PalpationOutcome::Finger::lifted);
-  EXPECT_LT(bench.rig.world().printer().head(bench.rig.now()).y, 130);
 }
 
 }  // namespace
