@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/windows/transforms/signal_features.h"
 #include "io/numbers/numbers.h"
+#include "models/inference/novelty.h"
 
 namespace supertac {
 

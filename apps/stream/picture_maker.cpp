@@ -4,9 +4,9 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "data/windows/transforms/signal_features.h"
 #include "io/numbers/numbers.h"
 #include "models/inference/interval.h"
+#include "models/inference/novelty.h"
 
 namespace supertac {
 namespace {

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "data/windows/transforms/signal_features.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 #include "models/inference/interval.h"
+#include "models/inference/novelty.h"
 
 namespace supertac {
 namespace {

@@ -1,17 +1,36 @@
 // Says when a window is unlike those a network was trained on.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "autograd/tensor.h"
+#include "data/sensors/taxel_array.h"
 #include "layers/checkpoint.h"
 
 namespace supertac {
 
-/// The Mahalanobis distance of a window's features z (data/windows/transforms/signal_features.h) from those
-/// of the training windows (Lee et al. 2018, with one class):
+/// Numbers of signal_features() of windows of so many frames: two for each signal, one for each pair of
+/// neighbouring rows; of single frames one for each signal.
+std::size_t signal_feature_count(const TaxelArray& array, std::size_t frames);
+
+/// The features of a window x [T][signals] as a network takes it, in this order:
+///   mean_k, for each signal
+///   log(sd_k + 0.0005): a dead taxel is stiller than any that is pressed
+///   lead_r = sum_k in row r of (x[t,k] x[t+L,k'] - x[t+L,k] x[t,k']), mean over t, the means taken off, as a
+///            share of the rows' swing sqrt(E_r E_r+1) + 0.003; k' is the taxel of row r + 1 behind k,
+///            L = T / 8, E_r the mean square of a row: rows slide over the same plate one after the other,
+///            and exchanged cables turn the order round
+/// About 64 frames, evenly spread, are looked at. A single frame is its own features: how its taxels go
+/// together tells the skin, and rows that are exchanged do not go together. Throws std::invalid_argument
+/// unless the window holds whole frames, one or 16 at least, and `out` has signal_feature_count numbers.
+void signal_features(std::span<const float> window, const TaxelArray& array, std::span<float> out);
+std::vector<float> signal_features(std::span<const float> window, const TaxelArray& array);
+
+/// The Mahalanobis distance of a window's signal_features() z from those of the training windows (Lee et al.
+/// 2018, with one class):
 ///   distance = |L^-1 (z - mean)| / sqrt(D),   covariance = L L^T
 /// about 1 for a window like those of training. The network's own latents would not serve: training with
 /// dropped taxels makes them blind to these. Nor would the VAEs' likelihood, which is high for any flat

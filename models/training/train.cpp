@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <utility>
 
-#include "data/windows/transforms/signal_features.h"
 #include "io/numbers/numbers.h"
 #include "layers/checkpoint.h"
 #include "models/inference/compiled/ranges.h"

@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "data/windows/transforms/signal_features.h"
 #include "tests/expect_error.h"
 #include "tests/models/support.h"
 

@@ -1,4 +1,4 @@
-#include "data/windows/transforms/signal_features.h"
+#include "models/inference/novelty.h"
 
 #include <gtest/gtest.h>
 
