@@ -157,7 +157,6 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
     a.print("95 % intervals of the network's contact windows over passes: " + interval);
   result["over_passes"] = scores.by_pass.to_json();
   for (const std::string& line : silence_lines(own, windows.contact_level().has_value())) a.print(line);
-  for (const std::string& line : scores.by_distance.lines()) a.print(line);
   for (const std::string& line : scores.by_group.lines()) a.print(line);
   for (const std::string& line : scores.trust.lines()) a.print(line);
   for (const std::string& line : scores.map.lines()) a.print(line);

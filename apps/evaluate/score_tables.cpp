@@ -29,20 +29,6 @@ void DistanceScores::add(const ContactScore& one) {
   parts_[p].sums.add(one);
 }
 
-std::vector<std::string> DistanceScores::lines() const {
-  std::vector<std::string> lines;
-  for (std::size_t p = 0; p < parts_.size(); ++p) {
-    const ScoreSums& sums = parts_[p].sums;
-    if (sums.windows == 0) continue;
-    const std::string to =
-        p + 1 < parts_.size() ? " to " + format(parts_[p + 1].from_mm, 0) + " mm" : " mm or more";
-    lines.push_back(format(parts_[p].from_mm, 0) + to + " after the first contact: SSIM " +
-                    format(sums.mean_ssim(), 3) + ", PSNR " + format(sums.mean_psnr(), 2) + " dB, " +
-                    std::to_string(sums.windows) + " windows");
-  }
-  return lines;
-}
-
 nlohmann::ordered_json DistanceScores::to_json() const {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const auto& [from_mm, sums] : parts_)

@@ -45,8 +45,6 @@ class DistanceScores {
   explicit DistanceScores(const WindowSet& windows) : windows_(windows) {}
   /// Windows of a pass come in the order of time.
   void add(const ContactScore& one);
-  /// For people: nothing when no window was in contact.
-  std::vector<std::string> lines() const;
   /// [{"from_mm", "windows", "ssim", "psnr_mean_db"}, ...], without the parts no window fell into.
   nlohmann::ordered_json to_json() const;
 

@@ -124,9 +124,9 @@ TEST_F(Training, LikeRepeatsATrainingToTheSameContent) {
             content_hash(SafetensorsFile::read(path("again.safetensors"))));
   const SafetensorsFile file = SafetensorsFile::read(path("again.safetensors"));
   EXPECT_TRUE(contains(file.metadata().at("training"), "\"optimizer\":\"muon\""));
-  succeed(like + "other.safetensors --seed 8");
+  succeed(like + "seed8.safetensors --seed 8");
   EXPECT_NE(content_hash(SafetensorsFile::read(path("first.safetensors"))),
-            content_hash(SafetensorsFile::read(path("other.safetensors"))));
+            content_hash(SafetensorsFile::read(path("seed8.safetensors"))));
   expect_exit(run(like + "no.safetensors --preset tiny"), 2,
               "expected --preset NAME or --recipe-of MODEL, found both");
 }
