@@ -16,6 +16,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// The sets that this processor has, after SUPERTAC_ISA's names; portable always runs.
+std::vector<std::string> instruction_sets() {
+  std::vector<std::string> sets{"portable"};
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) sets.push_back("avx2");
+  if (__builtin_cpu_supports("avx512f")) sets.push_back("avx512");
+#endif
+  return sets;
+}
+
 // With a variable of the environment.
 ProcessResult with(const char* name, const std::string& value, const std::function<ProcessResult()>& run) {
   ::setenv(name, value.c_str(), 1);
@@ -52,6 +62,26 @@ TEST_F(Training, EvaluationWarnsOfSignalsThroughAnotherFilter) {
   };
   EXPECT_TRUE(warned_on("raw"));
   EXPECT_FALSE(warned_on("data"));
+}
+
+// Every set with every number of threads, over fewer steps: Trainer.PinnedBits.
+TEST_F(Training, TwoHundredStepsGiveTheSameBytesOnEverySetAndAnyThreads) {
+  std::string first;
+  for (const std::string& set : instruction_sets()) {
+    const bool slow = set == "portable";
+    for (const std::string threads : slow ? std::vector{"2"} : std::vector{"1", "2", "4"}) {
+      const std::string name = set + threads;
+      with("SUPERTAC_ISA", set, [&] {
+        return trained(name + ".safetensors",
+                       "--rate 300 --stride 4 --epochs 5 --checkpoint-every 1000 --threads " + threads +
+                           " --json " + name + ".json");
+      });
+      ASSERT_GE(parse_json_limited(bytes(name + ".json"))["steps"].get<int>(), 200);
+      const std::string model = bytes(name + ".safetensors") + bytes(name + ".run/last.safetensors");
+      if (first.empty()) first = model;
+      EXPECT_TRUE(model == first) << name << " differs from the first set's";
+    }
+  }
 }
 
 TEST_F(Training, AnUnknownInstructionSetIsRefused) {
