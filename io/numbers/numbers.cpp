@@ -1,6 +1,7 @@
 #include "io/numbers/numbers.h"
 
 #include <charconv>
+#include <cmath>
 
 namespace supertac {
 namespace {
@@ -30,6 +31,11 @@ std::optional<std::uint64_t> parse_uint(std::string_view text) { return parse<st
 std::optional<double> number_of(std::string_view text) {
   if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   return parse_double(text);
+}
+
+double decimal(double digits, double exponent) {
+  return exponent < 0 ? digits / std::round(std::pow(10, -exponent))
+                      : digits * std::round(std::pow(10, exponent));
 }
 
 std::string format(double value) { return to_text(value); }
