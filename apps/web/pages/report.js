@@ -43,7 +43,7 @@ function ticks(low, high, logarithmic) {
 function axis(values, from, to, {logarithmic, most = Infinity}) {
   const of = logarithmic ? Math.log10 : (v) => v, back = logarithmic ? (v) => 10 ** v : (v) => v;
   let low = of(Math.min(...values)), high = of(Math.max(...values));
-  const room = high > low ? 0.04 * (high - low) : Math.max(1e-6, 0.1 * Math.abs(low));
+  const room = high > low ? 0.04 * (high - low) : Math.max(logarithmic ? 0.1 : 1e-6, 0.1 * Math.abs(low));
   low -= room, high = Math.min(high + room, most);
   return {at: (v) => (from + (to - from) * (of(v) - low) / (high - low)).toFixed(1),
     numbers: ticks(back(low), back(high), logarithmic)};
