@@ -111,7 +111,8 @@ struct TableImport {
     std::array<float, 2> low{1e30F, 1e30F}, high{-1e30F, -1e30F};
     std::size_t known = 0, on = 0, on_exchanged = 0;
     const auto over = [&](double x, double y) {
-      return x > -reach_x && x < Plate::kWidthMm + reach_x && y > -reach_y && y < Plate::kLengthMm + reach_y;
+      return x > -reach_x && x < rig::kPlateWidthMm + reach_x && y > -reach_y &&
+             y < rig::kPlateLengthMm + reach_y;
     };
     for (std::size_t i = 0; i + 1 < recording.position_mm.size(); i += 2) {
       const float x = recording.position_mm[i], y = recording.position_mm[i + 1];
@@ -124,8 +125,8 @@ struct TableImport {
     if (known == 0 || (kFew * on >= known && on >= on_exchanged && !corner)) return;
     throw FileError(path, "the array's centre goes from x " + format(low[0], 2) + " to " +
                               format(high[0], 2) + " and y " + format(low[1], 2) + " to " +
-                              format(high[1], 2) + ", expected mm on a plate of " + format(Plate::kWidthMm) +
-                              " x " + format(Plate::kLengthMm) +
+                              format(high[1], 2) + ", expected mm on a plate of " +
+                              format(rig::kPlateWidthMm) + " x " + format(rig::kPlateLengthMm) +
                               (corner              ? "; are these metres?"
                                : on_exchanged > on ? "; are x and y exchanged?"
                                                    : "; take off the plate's origin"));

@@ -99,7 +99,7 @@ WindowSet sliding_bumps(const SuperTacSettings& model) {
     const double time = i / 300.0, y = 28 + r.speed_mm_s * time;
     r.time_s.push_back(time);
     r.position_mm.insert(r.position_mm.end(), {18, static_cast<float>(y)});
-    for (int k = 0; k < kTaxels; ++k)
+    for (int k = 0; k < rig::kTaxels; ++k)
       r.signals.push_back(static_cast<float>(2.44 - 0.1 * plate.height(18, y - 4.5 + 3 * (k / 4))));
   }
   windows.add(r);
@@ -152,15 +152,15 @@ class Ours {
 
  private:
   Tensor first_windows(Dim count) const {
-    const Dim values = count * model_->settings().timesteps * kTaxels;
-    return Tensor::of({count, model_->settings().timesteps, kTaxels},
+    const Dim values = count * model_->settings().timesteps * rig::kTaxels;
+    return Tensor::of({count, model_->settings().timesteps, rig::kTaxels},
                       windows_.values().first(static_cast<std::size_t>(values)));
   }
 
   static Tensor read_windows(const std::string& path) {
     const SafetensorsFile file = SafetensorsFile::read(path);
     const TensorInfo& info = file.tensors().at("windows");
-    return Tensor::of({static_cast<Dim>(info.shape.at(0)), static_cast<Dim>(info.shape.at(1)), kTaxels},
+    return Tensor::of({static_cast<Dim>(info.shape.at(0)), static_cast<Dim>(info.shape.at(1)), rig::kTaxels},
                       file.f32("windows"));
   }
 

@@ -77,12 +77,8 @@ std::optional<FoundFormat> found_by_roles(TextGrammar& grammar, double seconds,
     (known == said.end() ? said.emplace_back(what, std::vector<int>{}) : *known).second.push_back(column);
   }
   says.insert(says.end(), grammar.says.begin(), grammar.says.end());
-  constexpr std::size_t kMostSaid = 12;
-  for (std::size_t i = 0; i < std::min(said.size(), kMostSaid); ++i)
-    says.push_back("slot" + std::string(said[i].second.size() > 1 ? "s " : " ") + places(said[i].second) +
-                   ": " + said[i].first);
-  if (said.size() > kMostSaid)
-    says.push_back("and " + std::to_string(said.size() - kMostSaid) + " more roles");
+  for (const auto& [what, columns] : said)
+    says.push_back((columns.size() > 1 ? "slots " : "slot ") + places(columns) + ": " + what);
   const auto channels = static_cast<std::size_t>(grammar.channels);
   auto array = values == 0 ? std::nullopt : assumed_array(values / channels);
   if (array) array->channels = grammar.channels;

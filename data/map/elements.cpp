@@ -120,8 +120,8 @@ class Placed : public Surface {
   double height(double x_mm, double y_mm) const override {
     double highest = 0;
     for (const Element& e : found_)
-      highest = std::max(
-          highest, kind_.height(Plate::kWidthMm / 2 + x_mm - e.x_mm, Plate::kLengthMm / 2 + y_mm - e.y_mm));
+      highest = std::max(highest, kind_.height(rig::kPlateWidthMm / 2 + x_mm - e.x_mm,
+                                               rig::kPlateLengthMm / 2 + y_mm - e.y_mm));
     return highest;
   }
 

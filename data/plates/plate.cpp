@@ -79,9 +79,9 @@ struct Band {
   Band(const Texture& t, const TextureKind& k) : kind(&k), texture(t) {
     const double width = k.width(t), pitch = t.pitch_mm;
     count_y = elements_that_fit(t.to_mm - t.from_mm, pitch, width);
-    count_x = elements_that_fit(Plate::kWidthMm, pitch, width);
+    count_x = elements_that_fit(rig::kPlateWidthMm, pitch, width);
     first_y = (t.from_mm + t.to_mm) / 2 - (count_y - 1) * pitch / 2;
-    first_x = Plate::kWidthMm / 2 - (count_x - 1) * pitch / 2;
+    first_x = rig::kPlateWidthMm / 2 - (count_x - 1) * pitch / 2;
     begin = first_y - width / 2;
     end = first_y + (count_y - 1) * pitch + width / 2;
   }
@@ -97,8 +97,8 @@ class Bands : public Surface {
  public:
   explicit Bands(std::vector<Band> bands) : bands_(std::move(bands)) {
     auto& [highest, lowest, begin, end, uniform, crests] = extent_;
-    begin = bands_.empty() ? Plate::kLengthMm / 2 : bands_.front().begin;
-    end = bands_.empty() ? Plate::kLengthMm / 2 : bands_.front().end;
+    begin = bands_.empty() ? rig::kPlateLengthMm / 2 : bands_.front().begin;
+    end = bands_.empty() ? rig::kPlateLengthMm / 2 : bands_.front().end;
     for (const Band& band : bands_) {
       begin = std::min(begin, band.begin), end = std::max(end, band.end);
       highest = std::max(highest, band.texture.height_mm);
@@ -190,7 +190,7 @@ bool Plate::is_file(const std::string& name) {
 Plate Plate::named(const std::string& name) {
   if (is_file(name))
     return {std::filesystem::path(name).filename().string(),
-            std::make_shared<const HeightMap>(read_stl(name), kWidthMm, kLengthMm, name)};
+            std::make_shared<const HeightMap>(read_stl(name), rig::kPlateWidthMm, rig::kPlateLengthMm, name)};
   if (const auto number = random_plate_number(name)) return random_plate(*number);
   const std::string generic = generic_name(name);
   std::vector<Texture> textures;

@@ -19,12 +19,10 @@ struct Texture {
   double from_mm = rig::kTextureFromMm, to_mm = rig::kTextureToMm;
 };
 
-/// The surface the finger slides over: kWidthMm (x) by kLengthMm (y), with its texture in the middle third.
-/// Coordinates are the plate's own, origin at its corner; z = 0 is its flat part.
+/// The surface the finger slides over: rig::kPlateWidthMm (x) by kPlateLengthMm (y), with its texture in the
+/// middle third. Coordinates are the plate's own, origin at its corner; z = 0 is its flat part.
 class Plate {
  public:
-  static constexpr double kWidthMm = rig::kPlateWidthMm, kLengthMm = rig::kPlateLengthMm;
-
   /// A plate by name. Plates of the rig: 3_Bumps, 6_Bumps, 4_Ridges, 6_Ridges, 4_Waves, 6_Waves, 4_Blob,
   /// 6_Blob. Others: "plain", or KIND PITCH [h HEIGHT] in mm ("bumps12", "ridges6h1.5"), or several joined by
   /// '+', which share the length equally ("bumps12+ridges4"), or "random" and a number, the plate that
@@ -40,7 +38,7 @@ class Plate {
   /// not positive or do not fit.
   Plate(std::string name, const std::vector<Texture>& textures);
 
-  /// A plate of kWidthMm x kLengthMm. Copies share the surface.
+  /// A plate of that size. Copies share the surface.
   Plate(std::string name, std::shared_ptr<const Surface> surface);
 
   /// Surface height z (mm) at (x, y); negative in the troughs of waves, 0 outside the texture.

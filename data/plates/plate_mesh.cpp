@@ -9,7 +9,7 @@
 namespace supertac {
 namespace {
 
-constexpr double kSliverMm = 1e-3;  // lines closer than this are one
+constexpr double kSliverMm = 1e-3;  // lines, and heights, closer than this are one
 
 using Vertex = std::array<float, 3>;
 
@@ -31,7 +31,7 @@ std::vector<double> without_slivers(std::vector<double> lines) {
 std::vector<double> lines_along_y(const Plate& plate, double step) {
   const double begin = std::max(0.0, plate.texture_begin()), end = plate.texture_end();
   std::vector<double> lines = lattice(begin, std::max(begin, end), step);
-  lines.insert(lines.end(), {0, Plate::kLengthMm});
+  lines.insert(lines.end(), {0, rig::kPlateLengthMm});
   for (const double crest : plate.crests()) lines.push_back(crest);
   return without_slivers(lines);
 }
@@ -45,18 +45,17 @@ struct Top {
 
 // Surfaces that were read count as uniform within more than a solid may be off.
 bool is_same_along_x(const Plate& plate, const std::vector<double>& xs, const std::vector<double>& ys) {
-  constexpr double kSameMm = 1e-3;
   return plate.uniform_in_x() && std::ranges::all_of(ys, [&](double y) {
            return std::ranges::all_of(
-               xs, [&](double x) { return std::abs(plate.height(x, y) - plate.height(0, y)) <= kSameMm; });
+               xs, [&](double x) { return std::abs(plate.height(x, y) - plate.height(0, y)) <= kSliverMm; });
          });
 }
 
 Top top_of(const Plate& plate, double step) {
   Top top;
-  top.xs = without_slivers(lattice(0, Plate::kWidthMm, step));
+  top.xs = without_slivers(lattice(0, rig::kPlateWidthMm, step));
   top.ys = lines_along_y(plate, step);
-  if (is_same_along_x(plate, top.xs, top.ys)) top.xs = {0, Plate::kWidthMm};
+  if (is_same_along_x(plate, top.xs, top.ys)) top.xs = {0, rig::kPlateWidthMm};
   for (const double y : top.ys)
     for (const double x : top.xs)
       top.points.push_back(
@@ -94,8 +93,8 @@ std::vector<Triangle> mesh_of(const Plate& plate, const MeshSettings& settings) 
     for (std::size_t c = 0; c + 1 < top.xs.size(); ++c)
       add_quad(top.at(r, c), top.at(r, c + 1), top.at(r + 1, c + 1), top.at(r + 1, c));
   const auto outline = outline_of(top);
-  const Vertex centre = {static_cast<float>(Plate::kWidthMm / 2), static_cast<float>(Plate::kLengthMm / 2),
-                         bottom};
+  const Vertex centre = {static_cast<float>(rig::kPlateWidthMm / 2),
+                         static_cast<float>(rig::kPlateLengthMm / 2), bottom};
   for (std::size_t i = 0; i < outline.size(); ++i) {
     const Vertex &a = outline[i], &b = outline[(i + 1) % outline.size()];
     const Vertex below_a = {a[0], a[1], bottom}, below_b = {b[0], b[1], bottom};

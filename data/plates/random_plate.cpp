@@ -13,14 +13,13 @@ namespace supertac {
 namespace {
 
 constexpr std::string_view kWord = "random";
-constexpr std::uint64_t kStream = 0x706c617465ULL;  // "plate"
 constexpr double kLeastPitchMm = 4, kMostPitchMm = 15, kLeastHeightMm = 0.5, kMostHeightMm = 3;
 constexpr double kSamePitchMm = 0.5;
 
 /// Random numbers one after the other.
 class Draw {
  public:
-  explicit Draw(std::uint32_t number) : random_(number, kStream) {}
+  explicit Draw(std::uint32_t number) : random_(number, stream_named("plate")) {}
   double between(double low, double high) { return low + (high - low) * random_.uniform(next_++); }
   bool chance(double share) { return random_.uniform(next_++) < share; }
   int one_of(int count) { return static_cast<int>(random_.uniform(next_++) * count); }
@@ -51,7 +50,7 @@ struct Element {
   }
   /// Half of its extent along y, over the whole plate.
   double reach_mm() const {
-    return line ? (width_mm / 2 + std::abs(across_x) * Plate::kWidthMm / 2) / across_y : width_mm / 2;
+    return line ? (width_mm / 2 + std::abs(across_x) * rig::kPlateWidthMm / 2) / across_y : width_mm / 2;
   }
 };
 
@@ -62,7 +61,7 @@ class Elements : public Surface {
     begin = end = elements_.front().y_mm;
     for (const Element& e : elements_) {
       begin = std::min(begin, std::max(0.0, e.y_mm - e.reach_mm()));
-      end = std::max(end, std::min(Plate::kLengthMm, e.y_mm + e.reach_mm()));
+      end = std::max(end, std::min(rig::kPlateLengthMm, e.y_mm + e.reach_mm()));
       highest = std::max(highest, e.height_mm);
       uniform = uniform && e.line && e.across_x == 0;
       crests.push_back(e.y_mm);
@@ -107,7 +106,7 @@ std::vector<Element> draw_lines(Draw& draw, double from_mm, double to_mm) {
   Element element = draw_element(draw, true);
   std::vector<Element> lines;
   for (double y = from_mm + element.width_mm / 2; y < to_mm;) {
-    element.x_mm = Plate::kWidthMm / 2, element.y_mm = y;
+    element.x_mm = rig::kPlateWidthMm / 2, element.y_mm = y;
     element.across_x = same_bits::sine(turn), element.across_y = same_bits::cosine(turn);
     lines.push_back(element);
     if (mixed) element = draw_element(draw, true);
@@ -124,7 +123,7 @@ std::vector<Element> draw_scattered(Draw& draw, double from_mm, double to_mm) {
   for (int i = 0; i < count; ++i) {
     Element e = draw_element(draw, false);
     if (hills) e.form = Form::hill, e.width_mm = draw.between(4, 12);
-    e.x_mm = draw.between(0, Plate::kWidthMm), e.y_mm = draw.between(from_mm, to_mm);
+    e.x_mm = draw.between(0, rig::kPlateWidthMm), e.y_mm = draw.between(from_mm, to_mm);
     elements.push_back(e);
   }
   return elements;
@@ -149,7 +148,7 @@ Plate random_plate(std::uint32_t number) {
   if (layout < 13.5) return made_of(name, draw_lines(draw, from, to));
   if (layout < 14.5) {
     Element e = draw_element(draw, true);
-    e.x_mm = Plate::kWidthMm / 2, e.y_mm = draw.between(from, to);
+    e.x_mm = rig::kPlateWidthMm / 2, e.y_mm = draw.between(from, to);
     return made_of(name, {e});
   }
   return made_of(name, draw_scattered(draw, from, to));

@@ -12,8 +12,8 @@ namespace supertac {
 namespace {
 
 // Taxel gains of the rig: geometric means over fits to its recordings. Of another array nothing is known.
-constexpr double kGain[kTaxels] = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20, 0.60,
-                                   0.27, 0.55, 0.20, 0.65, 0.50, 0.40, 0.10, 0.80};
+constexpr double kGain[rig::kTaxels] = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20, 0.60,
+                                        0.27, 0.55, 0.20, 0.65, 0.50, 0.40, 0.10, 0.80};
 // Of three axes: how far below rest those along the plate are where nothing leans, and the skin that is
 // dragged.
 constexpr double kMiddleVolts = (rig::kRestVolts - rig::kFloorVolts) / 2, kFriction = 0.3;
@@ -34,8 +34,8 @@ int points_along(const TaxelArray& a) { return points_of(a.rows, a.pitch_mm.y, k
 // Grid of the plate's surface: wide enough for the rig's whole pad with its centre on the plate; beyond it
 // everything is as at its edge.
 constexpr double kCellMm = 0.25, kMarginMm = 12;
-constexpr int kColumns = static_cast<int>((Plate::kWidthMm + 2 * kMarginMm) / kCellMm) + 1;
-constexpr int kRows = static_cast<int>((Plate::kLengthMm + 2 * kMarginMm) / kCellMm) + 1;
+constexpr int kColumns = static_cast<int>((rig::kPlateWidthMm + 2 * kMarginMm) / kCellMm) + 1;
+constexpr int kRows = static_cast<int>((rig::kPlateLengthMm + 2 * kMarginMm) / kCellMm) + 1;
 
 // As often half as twice.
 double factor(double v) { return v >= 0 ? 1 + v : 1 / (1 - v); }
@@ -110,7 +110,7 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
   for (int r = 0; r < kRows; ++r)
     for (int c = 0; c < kColumns; ++c) {
       const double x = c * kCellMm - kMarginMm, y = r * kCellMm - kMarginMm;
-      const bool beside = x < 0 || x > Plate::kWidthMm || y < 0 || y > Plate::kLengthMm;
+      const bool beside = x < 0 || x > rig::kPlateWidthMm || y < 0 || y > rig::kPlateLengthMm;
       map_[static_cast<std::size_t>(r * kColumns + c)] =
           beside && settings.with_edges ? -3 : plate.height(x, y);
     }

@@ -46,9 +46,9 @@ class Wander {
  public:
   Wander(double strength, std::uint64_t seed, std::uint64_t stream)
       : strength_(strength),
-        across_(seed, kStream + stream),
-        along_(seed, kStream + stream + 1),
-        height_(seed, kStream + stream + 2) {}
+        across_(seed, stream_named("wander") + stream),
+        along_(seed, stream_named("wander") + stream + 1),
+        height_(seed, stream_named("wander") + stream + 2) {}
   void apply(FingerPose& pose) const {
     if (strength_ <= 0) return;
     pose.slope_x += strength_ * rocking(across_, pose.y_mm);
@@ -57,7 +57,6 @@ class Wander {
   }
 
  private:
-  static constexpr std::uint64_t kStream = 0x77616e646572ULL;  // "wander"
   double strength_;
   RandomStream across_, along_, height_;
 };
@@ -65,10 +64,10 @@ class Wander {
 void check(const PassSettings& pass, const SimulatorSettings& settings) {
   const auto positive = [](double v) { return std::isfinite(v) && v > 0; };
   if (!positive(pass.speed_mm_s) || !positive(settings.rate_hz) || !(pass.to_mm > pass.from_mm) ||
-      !(pass.from_mm >= 0) || !(pass.to_mm <= Plate::kLengthMm))
+      !(pass.from_mm >= 0) || !(pass.to_mm <= rig::kPlateLengthMm))
     throw std::invalid_argument(
         "simulate_pass: speed and rate must be positive and the slide lie on the plate (0.." +
-        format(Plate::kLengthMm) + " mm); got speed " + format(pass.speed_mm_s) + " mm/s, rate " +
+        format(rig::kPlateLengthMm) + " mm); got speed " + format(pass.speed_mm_s) + " mm/s, rate " +
         format(settings.rate_hz) + " Hz, slide from " + format(pass.from_mm) + " to " + format(pass.to_mm) +
         " mm");
   if (pass.pass < 1 || pass.pass > rig::kPasses || pass.trial < 1)
@@ -123,7 +122,7 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
   const auto frames = static_cast<std::size_t>(std::floor(duration * settings.rate_hz + 0.5));
   // Timing faults have a stream of their own for each pass, so that a loss in one pass does not move
   // another's.
-  const RandomStream timing(seed, 0x7469'6d65ULL + finger.noise_stream());
+  const RandomStream timing(seed, stream_named("time") + finger.noise_stream());
   const Wander wander(settings.wander, seed, finger.noise_stream());
   MovingAverage filter(static_cast<int>(std::lround(settings.filter_s * settings.rate_hz)));
 

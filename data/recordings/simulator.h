@@ -14,7 +14,7 @@ struct PassSettings {
   int trial = 1,
       pass = 1;  ///< pass p slides at x = rig::pass_x_mm(p), from one side of the plate to the other
   double speed_mm_s = rig::kSlideMmS;
-  double from_mm = 0, to_mm = Plate::kLengthMm;  ///< the slide, of the finger's centre
+  double from_mm = 0, to_mm = rig::kPlateLengthMm;  ///< the slide, of the finger's centre
 };
 
 /// A recording of one pass as the rig would make it, with the finger's true position at every time stamp.

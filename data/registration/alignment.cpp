@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <vector>
 
@@ -19,10 +18,8 @@ namespace {
 constexpr std::size_t kProfileRows = rig::kTaxelRows, kProfilePoints = 701;
 using Profile = std::array<std::array<double, kProfilePoints>, kProfileRows>;
 
-constexpr std::size_t kColumns = rig::kTaxelColumns;
 constexpr double kFromMm = 22, kStepMm = 0.1, kSmoothMm = 1;
 constexpr std::size_t kFewestPoints = 200;  // to speak of a correlation
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 // Mean 0, deviation 1 over the points that are known; all unknown when there are too few or nothing changes.
 void standardise(std::array<double, kProfilePoints>& row) {
@@ -31,7 +28,7 @@ void standardise(std::array<double, kProfilePoints>& row) {
     if (std::isfinite(v)) n += 1, sum += v, squares += v * v;
   const double mean = sum / n, deviation = std::sqrt(std::max(0.0, squares / n - mean * mean));
   const bool flat = n < kFewestPoints || !(deviation > 1e-6);
-  for (double& v : row) v = flat ? kUnknown : (v - mean) / deviation;
+  for (double& v : row) v = flat ? NAN : (v - mean) / deviation;
 }
 
 // The signals of a pass, made ready for many calls of along().
@@ -47,9 +44,9 @@ class PassSignals {
     for (std::size_t row = 0; row < kProfileRows; ++row) {
       std::vector<double> pressed(time_s_.size());
       for (std::size_t i = 0; i < pressed.size(); ++i)
-        for (std::size_t column = 0; column < kColumns; ++column) {
-          const float v = recording.signals[(first + i) * kTaxels + row * kColumns + column];
-          pressed[i] += std::isfinite(v) ? Scaling{}(v) / kColumns : 0;
+        for (std::size_t column = 0; column < rig::kTaxelColumns; ++column) {
+          const float v = recording.signals[(first + i) * rig::kTaxels + row * rig::kTaxelColumns + column];
+          pressed[i] += std::isfinite(v) ? Scaling{}(v) / rig::kTaxelColumns : 0;
         }
       sum_[row].assign(pressed.size() + 1, 0);
       for (std::size_t i = 0; i < pressed.size(); ++i) sum_[row][i + 1] = sum_[row][i] + pressed[i];
@@ -77,7 +74,7 @@ class PassSignals {
       const bool known = from > 0 && to < time_s_.size() && from < to;
       for (std::size_t row = 0; row < kProfileRows; ++row)
         profile[row][point] =
-            known ? (sum_[row][to] - sum_[row][from]) / static_cast<double>(to - from) : kUnknown;
+            known ? (sum_[row][to] - sum_[row][from]) / static_cast<double>(to - from) : NAN;
     }
     for (auto& row : profile) standardise(row);
     return profile;
@@ -96,7 +93,7 @@ Profile mean_of_others(const std::vector<Profile>& profiles, std::size_t left_ou
       double n = 0, sum = 0;
       for (std::size_t i = 0; i < profiles.size(); ++i)
         if (const double v = profiles[i][row][point]; i != left_out && std::isfinite(v)) n += 1, sum += v;
-      mean[row][point] = n > 0 ? sum / n : kUnknown;
+      mean[row][point] = n > 0 ? sum / n : NAN;
     }
   return mean;
 }

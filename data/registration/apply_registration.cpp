@@ -52,7 +52,7 @@ void apply(const Registration& registration, Recording& recording, double x_mm) 
     const bool known =
         recording.time_s[i] >= registration.valid_from_s && recording.time_s[i] <= registration.valid_until_s;
     recording.position_mm[2 * i] = x;
-    recording.position_mm[2 * i + 1] = known ? static_cast<float>(std::clamp(y, 0.0, Plate::kLengthMm))
+    recording.position_mm[2 * i + 1] = known ? static_cast<float>(std::clamp(y, 0.0, rig::kPlateLengthMm))
                                              : std::numeric_limits<float>::quiet_NaN();
   }
   if (registration.lost_s > 0) fill_loss(registration, recording);

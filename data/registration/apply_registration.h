@@ -13,6 +13,6 @@ namespace supertac {
 /// stretched so that the finger of a reliable pass moves at its commanded speed (10 mm/s where that is
 /// unknown); time_base becomes "registered". Metadata registration_start_mm, _rate, _residual_mm, _reliable
 /// (yes, no), _reason, _shift_mm, _stretch_mm and _lost_s.
-void apply(const Registration& registration, Recording& recording, double x_mm = Plate::kWidthMm / 2);
+void apply(const Registration& registration, Recording& recording, double x_mm = rig::kPlateWidthMm / 2);
 
 }  // namespace supertac

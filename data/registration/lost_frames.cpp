@@ -16,11 +16,9 @@ namespace {
 constexpr std::size_t kAround = 40;      // steps to either side that say what is usual, ...
 constexpr std::size_t kEvery = 8;        // ... asked so often: it changes slowly
 constexpr double kRoundingVolts = 1e-5;  // of a step in a text file
-constexpr double kSigma = 1.4826;        // of a normal distribution, over the median absolute deviation
 constexpr double kLeastSteps = 1.5, kUncertainties = 3;
 constexpr double kSeenUncertainty = 0.25;
 constexpr double kBurstVolts = 0.08, kBurstRatio = 60, kQuietVolts = 1e-4;
-constexpr std::size_t kBurstNeighbours = 100;
 
 // Of one signal.
 double step_before(const Recording& recording, std::size_t i, std::size_t s) {
@@ -44,7 +42,7 @@ Usual usual_step(const Recording& recording, std::size_t around, std::size_t s) 
   const std::span<double> steps = std::span(found).first(n);
   const double step = median(steps);
   for (double& d : steps) d = std::abs(d - step);
-  return {.step = step, .deviation = kSigma * median(steps) + kRoundingVolts};
+  return {.step = step, .deviation = normal_deviation(steps) + kRoundingVolts};
 }
 
 // How many usual steps all signals took at once.
@@ -70,7 +68,7 @@ Steps steps_before(const Recording& recording, std::size_t i, std::span<const Us
 std::vector<double> changes(const Recording& recording) {
   const std::size_t signals = recording.array.signals();
   const double share = std::abs(SignalScale{}.span / recording.signal_scale.span) *
-                       static_cast<double>(kTaxels) / static_cast<double>(signals);  // of the rig: 1
+                       static_cast<double>(rig::kTaxels) / static_cast<double>(signals);  // of the rig: 1
   std::vector<double> change(recording.frames());
   for (std::size_t i = 1; i < change.size(); ++i)
     for (std::size_t s = 0; s < signals; ++s) {
@@ -84,7 +82,6 @@ std::vector<double> changes(const Recording& recording) {
 }  // namespace
 
 std::vector<double> find_lost_frames(const Recording& recording, double rate_hz) {
-  constexpr double kUnseen = -1;
   std::vector<double> lost(recording.frames());
   std::vector<Usual> usual(recording.array.signals());
   double sum = 0, seen = 0;
@@ -93,7 +90,7 @@ std::vector<double> find_lost_frames(const Recording& recording, double rate_hz)
       for (std::size_t s = 0; s < usual.size(); ++s)
         usual[s] = usual_step(recording, std::min(i + kEvery / 2, recording.frames() - 1), s);
     const Steps steps = steps_before(recording, i, usual);
-    lost[i] = kUnseen;
+    lost[i] = NAN;
     if (steps.uncertainty > kSeenUncertainty) continue;
     const double known = std::round((recording.time_s[i] - recording.time_s[i - 1]) * rate_hz);
     const bool jumped = steps.count > kLeastSteps + kUncertainties * steps.uncertainty;
@@ -101,7 +98,8 @@ std::vector<double> find_lost_frames(const Recording& recording, double rate_hz)
     sum += lost[i], ++seen;
   }
   const double mean = seen > 0 ? sum / seen : 0;
-  std::replace(lost.begin(), lost.end(), kUnseen, mean);
+  std::ranges::replace_if(
+      lost, [](double v) { return std::isnan(v); }, mean);
   return lost;
 }
 
@@ -119,8 +117,8 @@ std::vector<Stretch> stretches_of(const Recording& recording) {
   std::vector<Stretch> parts = {{.begin_s = recording.time_s.front()}};
   for (std::size_t i = 1; i < change.size(); ++i) {
     if (change[i] < kBurstVolts) continue;
-    const std::size_t from = i > kBurstNeighbours ? i - kBurstNeighbours : 0;
-    const std::size_t to = std::min(i + kBurstNeighbours + 1, change.size());
+    const std::size_t from = i > kAround ? i - kAround : 0;
+    const std::size_t to = std::min(i + kAround + 1, change.size());
     const double usual = (sum[to] - sum[from] - change[i]) / static_cast<double>(to - from - 1);
     if (change[i] < kBurstRatio * (usual + kQuietVolts)) continue;
     parts.back().end_s = recording.time_s[i - 1];

@@ -27,7 +27,7 @@ struct Stretch {
 };
 
 /// The recording cut at its bursts of lost frames, at least one stretch: where the signals of all taxels
-/// change from one frame to the next by 0.08 V in sum and by 60 times what is usual in the 200 frames around.
+/// change from one frame to the next by 0.08 V in sum and by 60 times what is usual in the 80 frames around.
 /// A moving average does not jump. Throws nothing; the recording must have a frame.
 std::vector<Stretch> stretches_of(const Recording& recording);
 

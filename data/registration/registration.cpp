@@ -92,7 +92,7 @@ class Fit {
     std::vector<Line> lines;
     for (double factor = kSlowest; factor < kFastest; factor *= 1 + kRateStep)
       for (double offset = -kMiddleReachMm; offset <= kMiddleReachMm; offset += kMiddleStepMm)
-        lines.push_back(scored(Plate::kLengthMm / 2 + offset, speed_ * factor));
+        lines.push_back(scored(rig::kPlateLengthMm / 2 + offset, speed_ * factor));
     for (const Line& line : lines)
       if (line.score > best.score) best = line;
     for (const Line& line : lines)
@@ -169,7 +169,8 @@ class Fit {
   // A pass covers the plate about evenly and its clock is about right: mild preference, in units of the
   // score.
   double preference(double middle_mm, double rate) const {
-    const double off = (middle_mm - Plate::kLengthMm / 2) / 10, fast = same_bits::log(rate / speed_) / 0.15;
+    const double off = (middle_mm - rig::kPlateLengthMm / 2) / 10,
+                 fast = same_bits::log(rate / speed_) / 0.15;
     return -0.05 * (off * off + fast * fast);
   }
 

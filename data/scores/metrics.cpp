@@ -17,7 +17,6 @@ namespace {
 
 constexpr int kGaussianSize = 11, kUniformSize = 7, kFewestPixels = 3;
 constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
-constexpr std::uint64_t kFloorSeed = 0x666c6f6f72;  // "floor"
 
 // One-dimensional weights of SSIM's window; the two-dimensional ones are their products.
 std::vector<double> ssim_weights(int size) {
@@ -174,7 +173,7 @@ void MetricsAccumulator::sample(std::span<const float> output, std::span<const f
     sampled_truths_.insert(sampled_truths_.end(), truth.begin(), truth.end());
     return;
   }
-  const double u = RandomStream(kFloorSeed, 0).uniform(n);
+  const double u = RandomStream(stream_named("floor"), 0).uniform(n);
   const auto slot = static_cast<std::uint64_t>(u * static_cast<double>(n + 1));
   if (slot >= kFloorPairs) return;
   const auto at = static_cast<std::ptrdiff_t>(slot * output.size());
@@ -188,7 +187,8 @@ double MetricsAccumulator::floor() const {
   if (count < 2) return Metrics::kNone;
   std::vector<std::size_t> partner(count);
   for (std::size_t i = 0; i < count; ++i) partner[i] = i;
-  const RandomStream random(kFloorSeed, 1);  // Sattolo's shuffle: one cycle, so nobody meets himself
+  const RandomStream random(stream_named("floor"),
+                            1);  // Sattolo's shuffle: one cycle, so nobody meets himself
   for (std::size_t i = count - 1; i > 0; --i)
     std::swap(partner[i], partner[static_cast<std::size_t>(random.uniform(i) * static_cast<double>(i))]);
   PhaseCorrelator correlator(grid_.height, grid_.width);

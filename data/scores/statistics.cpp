@@ -1,6 +1,7 @@
 #include "data/scores/statistics.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -15,9 +16,7 @@ namespace supertac {
 namespace {
 
 constexpr std::size_t kDraws = 10'000;
-constexpr std::size_t kMostExact = 20;
 constexpr std::uint64_t kRandomPatterns = 100'000;
-constexpr std::uint64_t kBootstrapStream = 0x626f6f74, kSignStream = 0x7369676e;
 
 }  // namespace
 
@@ -43,7 +42,7 @@ Interval bootstrap_interval(std::span<const ClusterCount> clusters, std::span<co
   std::vector<std::size_t> order(count);  // clusters by stratum
   std::iota(order.begin(), order.end(), std::size_t{0});
   if (!strata.empty()) std::ranges::stable_sort(order, {}, [&](std::size_t c) { return strata[c]; });
-  const RandomStream random(0, kBootstrapStream);
+  const RandomStream random(0, stream_named("boot"));
   std::uint64_t counter = 0;
   std::vector<double> shares(kDraws);
   for (double& one : shares) {
@@ -74,9 +73,9 @@ double sign_flip_p(std::span<const double> differences) {
   }
   // Sums of the same numbers in another order differ by roundings; a tie must stay a tie.
   const double least = std::abs(observed) - 1e-9 * size;
-  const bool exact = differences.size() <= kMostExact;
+  const bool exact = differences.size() < std::bit_width(kRandomPatterns);
   const std::uint64_t patterns = exact ? std::uint64_t{1} << differences.size() : kRandomPatterns;
-  const RandomStream random(0, kSignStream);
+  const RandomStream random(0, stream_named("sign"));
   std::uint64_t extreme = 0;
   for (std::uint64_t pattern = 0; pattern < patterns; ++pattern) {
     double sum = 0;

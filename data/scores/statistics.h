@@ -28,7 +28,7 @@ Interval bootstrap_interval(std::span<const ClusterCount> clusters, std::span<co
 
 /// Two-sided p-value of the paired permutation test: if two methods did not differ, exchanging their results
 /// within a pass, which flips the sign of that pass's difference, would change nothing. p is the share of the
-/// sign patterns whose |sum| is at least the observed one: of all 2^n for n <= 20, else of 100,000 random
+/// sign patterns whose |sum| is at least the observed one: of all 2^n for n <= 16, else of 100,000 random
 /// ones and the observed one. The smallest p for n passes is 2 / 2^n.
 /// Throws std::invalid_argument when there is no difference or one is not finite.
 double sign_flip_p(std::span<const double> differences);

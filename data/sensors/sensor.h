@@ -31,6 +31,9 @@ struct SignalScale {
   bool operator==(const SignalScale&) const = default;
 };
 
+/// "s", "ms", "us" or "ns" in seconds. Throws std::invalid_argument.
+double unit_of_time(const std::string& name);
+
 /// The time stamp in a frame.
 struct FrameTime {
   int column = 0;         ///< of a line of text

@@ -13,7 +13,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 20;
 constexpr std::pair<const char*, FrameKind> kKinds[] = {{"board", FrameKind::board},
                                                         {"text", FrameKind::text},
                                                         {"json", FrameKind::json},
@@ -261,9 +260,15 @@ SignalScale scale_of(JsonObject keys) {
   return sensor.scale;
 }
 
+double unit_of_time(const std::string& name) {
+  for (const auto& [unit, seconds] : kUnits)
+    if (name == unit) return seconds;
+  throw std::invalid_argument("time is in " + in_quotes(name) + ", expected s, ms, us or ns");
+}
+
 Sensor sensor_of_json(const std::string& text, const std::string& where) {
   try {
-    JsonObject keys(parse_json_limited(text, {.max_bytes = kMostBytes}), where);
+    JsonObject keys(parse_json_limited(text), where);
     Sensor sensor;
     sensor.name = keys.text("name", "sensor");
     sensor.array = take_array(keys);
@@ -299,7 +304,7 @@ Sensor sensor_of_json(const std::string& text, const std::string& where) {
 Sensor read_sensor(const std::string& name_or_path) {
   const Sensor rig;
   if (name_or_path == rig.name) return rig;
-  return sensor_of_json(read_text_file(name_or_path, kMostBytes), name_or_path);
+  return sensor_of_json(read_text_file(name_or_path, JsonLimits().max_bytes), name_or_path);
 }
 
 Json json_of(const Pitch& pitch) { return pitch.x == pitch.y ? Json(pitch.x) : Json{pitch.x, pitch.y}; }

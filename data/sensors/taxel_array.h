@@ -9,9 +9,6 @@
 
 namespace supertac {
 
-/// Signals of the rig's array, the default one.
-constexpr int kTaxels = rig::kTaxels;
-
 /// A distance along a row (x) and from row to row (y). Converts from one number that is both.
 struct Pitch {
   double x, y;
@@ -65,9 +62,6 @@ struct TaxelArray {
   void check() const;
   bool operator==(const TaxelArray&) const = default;
 };
-
-/// Most numbers a frame may have.
-constexpr std::size_t kMostSignals = 64 * 64 * 8;
 
 /// The mean over each taxel's channels, [rows][columns]: a frame as a picture shows it.
 /// Throws std::invalid_argument unless the frame has array.signals() values.

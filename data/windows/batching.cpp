@@ -10,17 +10,13 @@
 #include "io/numbers/random.h"
 
 namespace supertac {
-namespace {
-
-constexpr std::uint64_t kOrderStream = 0x6f7264ULL << 40;
-
-}  // namespace
+namespace {}  // namespace
 
 EpochOrder::EpochOrder(std::uint64_t count, std::uint64_t seed, std::uint64_t epoch) : count_(count) {
   if (count < 1 || count > std::uint64_t{1} << 32)
     throw std::invalid_argument("epoch order: count must be 1 to 2^32, got " + std::to_string(count));
   half_bits_ = std::max(1, (static_cast<int>(std::bit_width(count - 1)) + 1) / 2);
-  const RandomStream random(seed, kOrderStream ^ epoch);
+  const RandomStream random(seed, (stream_named("ord") << 40) ^ epoch);
   for (std::uint64_t r = 0; r < kRounds; ++r)
     keys_[r] = (std::uint64_t{random.bits(2 * r)} << 32) | random.bits(2 * r + 1);
 }

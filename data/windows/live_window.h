@@ -11,8 +11,8 @@
 namespace supertac {
 
 struct LiveWindowSettings {
-  int timesteps = 256;            ///< T, samples per window; 1: each frame as it is, whatever rate_hz
-  std::size_t signals = kTaxels;  ///< in a frame
+  int timesteps = 256;                 ///< T, samples per window; 1: each frame as it is, whatever rate_hz
+  std::size_t signals = rig::kTaxels;  ///< in a frame
   double rate_hz = 300;
   Scaling scaling = {};
   double filter_s = 0;                ///< moving average to apply to the frames; 0 = none

@@ -12,7 +12,6 @@
 namespace supertac {
 namespace {
 
-constexpr std::uint64_t kStream = 0x66696e676572ULL;  // "finger"
 constexpr double kLeastRateHz = 100;
 constexpr std::size_t kPlatesOfASeed = 100'000, kSeeds = 10'000;
 
@@ -63,18 +62,17 @@ SimulatorSettings finger_of(const RandomPasses& passes, const WindowSettings& wi
 }
 
 Recording simulate(std::uint32_t number, const RandomPasses& passes, const WindowSettings& windows) {
-  const RandomStream random(number, kStream);
+  const RandomStream random(number, stream_named("finger"));
   const PassSettings pass{.trial = 1,
                           .pass = 1 + static_cast<int>(number % rig::kPasses),
                           .speed_mm_s = passes.speed_mm_s,
                           .from_mm = from_edge_mm(random.uniform(kFrom)),
-                          .to_mm = Plate::kLengthMm - from_edge_mm(random.uniform(kTo))};
+                          .to_mm = rig::kPlateLengthMm - from_edge_mm(random.uniform(kTo))};
   Recording recording = simulate_pass(random_plate(number), pass, finger_of(passes, windows, random), number);
   restate(recording, windows.signal_scale.value_or(SignalScale{}));
   return recording;
 }
 
-constexpr std::uint64_t kSilentStream = 0x73696c656e74ULL;  // "silent"
 // Each two windows long and good for eight: other levels teach more than the same again.
 constexpr std::size_t kFewSilentPasses = 300, kOthersForASilentPass = 80;
 constexpr int kWindowsLong = 2, kWindowsOfAPass = 8;
@@ -103,8 +101,8 @@ Recording silent_pass(const RandomStream& random, const WindowSettings& windows,
       recording.signals.push_back(
           static_cast<float>(windows.scaling.rest - windows.scaling.span * std::clamp(x, 0.0, 1.0)));
     }
-    recording.position_mm.push_back(static_cast<float>(Plate::kWidthMm / 2));
-    recording.position_mm.push_back(static_cast<float>(Plate::kLengthMm / 2));
+    recording.position_mm.push_back(static_cast<float>(rig::kPlateWidthMm / 2));
+    recording.position_mm.push_back(static_cast<float>(rig::kPlateLengthMm / 2));
   }
   return recording;
 }
@@ -116,7 +114,7 @@ void add_silent_passes(WindowSet& windows, std::uint64_t seed, bool many) {
   const std::size_t count = many ? tenth : std::min(kFewSilentPasses, tenth);
   const int stride = std::max(1, windows.settings().timesteps / kWindowsOfAPass);
   for (std::uint64_t i = 0; i < count; ++i) {
-    const RandomStream random(seed, kSilentStream + i);
+    const RandomStream random(seed, stream_named("silent") + i);
     windows.add(silent_pass(random, windows.settings(), i >= kFewSilentPasses), ".",
                 {.training_only = true, .augmentable = false, .in_distribution = false, .stride = stride});
   }

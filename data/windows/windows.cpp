@@ -354,8 +354,8 @@ std::string WindowSet::fingerprint() const {
   if (array() != TaxelArray{}) hash.add(array().text());
   for (const auto& [plate, measured] : plates_) {
     if (measured || !Plate::is_file(plate.name())) continue;  // elsewhere the name is the plate
-    for (double y = 0; y <= Plate::kLengthMm; y += HeightMap::kCellMm)
-      for (double x = 0; x <= Plate::kWidthMm; x += HeightMap::kCellMm)
+    for (double y = 0; y <= rig::kPlateLengthMm; y += HeightMap::kCellMm)
+      for (double x = 0; x <= rig::kPlateWidthMm; x += HeightMap::kCellMm)
         hash.add(static_cast<float>(plate.height(x, y)));
   }
   for (std::size_t p = 0; p < passes_.size(); ++p) {

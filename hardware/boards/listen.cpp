@@ -9,7 +9,6 @@ namespace supertac {
 
 std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, double seconds,
                           const std::function<bool()>& stop) {
-  constexpr double kWaitS = 0.05;
   std::vector<Heard> heard;
   std::vector<std::byte> buffer(65536);
   std::size_t bytes = 0;
@@ -17,9 +16,9 @@ std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, dou
   double now = opened.port->now(), listened = 0;
   try {
     while (!stop() && listened < seconds && bytes < (16 << 20)) {
-      const Received got = opened.port->read(buffer, now + kWaitS);
+      const Received got = opened.port->read(buffer, now + kReadSlice);
       const double before = std::exchange(now, opened.port->now());
-      listened += std::min(now - before, kWaitS);
+      listened += std::min(now - before, kReadSlice);
       if (got.count == 0) continue;
       heard.push_back({got.time_s, {reinterpret_cast<const char*>(buffer.data()), got.count}});
       // As open_port() makes a line of it for a sensor that is known to send text.

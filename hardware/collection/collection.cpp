@@ -16,8 +16,6 @@
 namespace supertac {
 namespace {
 
-constexpr double kLargest = 1e10;  // of any number in an event: a journal may come from anywhere
-
 std::string point_text(const Point3& p) {
   return format(p.x, 4) + " " + format(p.y, 4) + " " + format(p.z, 4);
 }
@@ -31,7 +29,7 @@ std::optional<std::array<double, Count>> numbers_of(std::string_view text) {
     if (at == std::string_view::npos) return std::nullopt;
     const char* last = text.data() + text.size();
     const auto [end, error] = std::from_chars(text.data() + at + 1, last, value);
-    if (error != std::errc{} || !(std::abs(value) < kLargest)) return std::nullopt;
+    if (error != std::errc{} || !(std::abs(value) < kLatestTime)) return std::nullopt;
     at = end == last ? std::string_view::npos : static_cast<std::size_t>(end - text.data());
   }
   return at == std::string_view::npos ? std::optional(values) : std::nullopt;

@@ -22,7 +22,6 @@ constexpr std::uint32_t kMagic = 0x314A5453;  // "STJ1"
 constexpr std::size_t kChunkHeader = 24;      // magic, stream, length, CRC-32, time
 constexpr std::size_t kRecordHeader = 13;     // kind, time, length
 constexpr double kFlushAfter = 0.1;           // of recorded time, and of the wall's
-constexpr double kLatestTime = 1e10;          // s: 300 years, so that no arithmetic on times can overflow
 
 template <class T>
 void put(std::vector<std::byte>& out, T value) {

@@ -17,6 +17,9 @@
 
 namespace supertac {
 
+/// s: no time is later, nor any number of an event larger, so that no arithmetic on them can overflow.
+constexpr double kLatestTime = 1e10;
+
 enum class Stream : std::uint32_t { header = 1, board = 2, printer = 3, event = 4 };
 
 /// What happened at a port. One record per call, so that a replay can give the same answers.

@@ -10,7 +10,6 @@
 namespace supertac {
 namespace {
 
-constexpr double kOffLeg = 0.05;  // mm, beside the leg's line, by rounding
 // More than so many samples that do not fit are not noise: a cable that damages 0.2 % of the bytes spoils 3
 // %.
 
@@ -45,7 +44,7 @@ std::vector<std::pair<double, double>> cruise_of(const Leg& leg, const std::vect
   std::vector<std::pair<double, double>> places;
   for (const PositionSample& sample : samples) {
     const OnLeg at = on_leg(leg, sample.position);
-    if (at.off < kOffLeg && at.along > 0.15 * length && at.along < 0.85 * length)
+    if (at.off < kToleranceMm && at.along > 0.15 * length && at.along < 0.85 * length)
       places.emplace_back(sample.time_s, at.along);
   }
   return places;
@@ -80,7 +79,7 @@ std::vector<PositionSample> chain_of(const Leg& leg, double fastest,
                                      const std::vector<PositionSample>& samples) {
   std::vector<PositionSample> good = {{leg.sent_s, 0, leg.from}};
   for (const PositionSample& sample : samples)
-    if (on_leg(leg, sample.position).off < kOffLeg) good.push_back(sample);
+    if (on_leg(leg, sample.position).off < kToleranceMm) good.push_back(sample);
   if (leg.ended_s > 0) good.push_back({leg.ended_s, 0, leg.to});
   const auto follows = [&](std::size_t before, std::size_t after) {
     return reachable(fastest, good[before], good[after]) &&

@@ -7,8 +7,6 @@
 namespace supertac {
 namespace {
 
-constexpr int kPatienceS = 5;
-
 // What a thread of the C library reads and writes while it asks.
 struct Question {
   std::string host, service;

@@ -24,7 +24,6 @@ namespace supertac {
 namespace {
 
 constexpr int kSocketBytes = 4 << 20;
-constexpr double kConnectS = 5, kNoWriterWaitS = 0.02;
 
 /// Bytes of a descriptor that are only read.
 class DescriptorPort : public Port {
@@ -63,7 +62,7 @@ class DescriptorPort : public Port {
       // A FIFO that nobody has opened to write looks as one that has been closed.
       if (kind_ != Kind::fifo || began_) gone("");
       if (now() >= until) return {0, now()};
-      usleep(static_cast<useconds_t>(1e6 * std::clamp(until - now(), 0.0, kNoWriterWaitS)));
+      usleep(static_cast<useconds_t>(1e6 * std::clamp(until - now(), 0.0, kReadSlice)));
     }
   }
 
@@ -131,7 +130,7 @@ OpenedPort open_network(const std::string& address, const std::string& rest, boo
   const HostAddresses found = host_addresses("port " + printable(address), host, static_cast<int>(*number),
                                              datagrams ? SOCK_DGRAM : SOCK_STREAM);
   std::optional<int> descriptor;
-  const double until = monotonic_seconds() + kConnectS;
+  const double until = monotonic_seconds() + kPatienceS;
   std::ptrdiff_t left = 0;
   for (const addrinfo* at = found.get(); at != nullptr; at = at->ai_next) ++left;
   errno = ETIMEDOUT;

@@ -15,6 +15,9 @@ struct OpenedPort {
   bool stored = false;  ///< a file: when its bytes arrive says nothing
 };
 
+/// s: who waits for bytes looks after so long whether to go on.
+constexpr double kReadSlice = 0.05;
+
 /// `serial:DEVICE@BAUD` ("auto" finds the rig's board), udp:[HOST]:PORT (listens), tcp:HOST:PORT (connects,
 /// at most 5 s), "-" for standard input, or the path of a file or FIFO. `lines`: a datagram ends a line.
 /// `speedup` as SerialSettings. Throws PortError and its kinds.

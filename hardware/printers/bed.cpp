@@ -73,8 +73,7 @@ Bed bed_of_json(const std::string& text, const std::string& where) {
 }
 
 Bed read_bed(const std::string& path) {
-  constexpr std::uint64_t kMostBytes = 1 << 16;
-  return bed_of_json(read_text_file(path, kMostBytes), path);
+  return bed_of_json(read_text_file(path, JsonLimits().max_bytes), path);
 }
 
 Json json_of(const Bed& bed) {

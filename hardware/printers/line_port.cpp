@@ -26,8 +26,7 @@ bool LinePort::take(std::string& line) {
 
 bool LinePort::read(double until, std::string& line) {
   constexpr double kWatchInterval = 0.02;  // a fifth of the 0.1 s in which an unplugged board must be noticed
-  constexpr std::size_t kLongestInput = 4096;
-  std::array<std::byte, 1024> buffer{};
+  std::array<std::byte, 4096> buffer{};    // no line is longer
   while (!take(line)) {
     if (watch_) watch_();
     const Received got = port_.read(buffer, watch_ ? std::min(until, port_.now() + kWatchInterval) : until);
@@ -38,7 +37,7 @@ bool LinePort::read(double until, std::string& line) {
         static_cast<std::size_t>(std::ranges::count_if(bytes, [](std::byte b) { return !is_text(b); }));
     if (bytes.empty() && got.time_s >= until) return false;
     input_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    if (input_.size() <= kLongestInput || input_.find_first_of("\r\n") != std::string::npos) continue;
+    if (input_.size() <= buffer.size() || input_.find_first_of("\r\n") != std::string::npos) continue;
     input_.clear();
     if (got.time_s >= until) return false;  // bytes come for ever, and no line does
   }

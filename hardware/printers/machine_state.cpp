@@ -27,7 +27,6 @@ struct StateRule {
   bool homed = false;  // matters for a homed machine only: a confirmed origin is in the coordinates of now
 };
 
-constexpr int kMostQuestions = 6;         // at being understood
 constexpr double kGivenBackWithin = 0.5;  // s: nothing moves when a state is given back
 constexpr const char* kByHand = "set it by hand and start again";
 
@@ -72,8 +71,7 @@ std::optional<MarlinLink::Answer> run(MarlinLink& link, const std::string& comma
 /// and what it says may be a damaged complaint.
 bool set_by(MarlinLink& link, const std::string& command, double deadline_s = 0) {
   std::optional<MarlinLink::Answer> answer = run(link, command, deadline_s);
-  for (int i = 1; i < kMostQuestions && link.capabilities().klipper && !(answer && answer->replies.empty());
-       ++i)
+  for (int i = 1; i < kAttempts && link.capabilities().klipper && !(answer && answer->replies.empty()); ++i)
     answer = run(link, command, deadline_s);
   return answer.has_value();
 }
@@ -99,7 +97,7 @@ std::optional<std::string> value_by(MarlinLink& link, const StateRule& rule) {
     return answer ? value_in(*answer, rule.label) : std::nullopt;
   };
   std::optional<std::string> before = value();
-  for (int i = 0, same = 1; i < kMostQuestions && same < 3; ++i)
+  for (int i = 0, same = 1; i < kAttempts && same < 3; ++i)
     same = std::exchange(before, value()) == before ? same + 1 : 1;
   return before;
 }

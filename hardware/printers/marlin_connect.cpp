@@ -111,7 +111,7 @@ void MarlinLink::read_capabilities() {
   constexpr std::string_view kName = "FIRMWARE_NAME:";
   std::string& firmware = capabilities_.firmware;
   bool marlin = false, parser = false;
-  for (int attempt = 0; attempt < 6 && !(marlin && parser) && !capabilities_.klipper; ++attempt) {
+  for (int attempt = 0; attempt < kAttempts && !(marlin && parser) && !capabilities_.klipper; ++attempt) {
     for (const Reply& reply : command("M115").replies) {
       if (const std::size_t at = reply.text.find(kName); at != std::string::npos && !marlin) {
         const std::string_view rest = trimmed(std::string_view(reply.text).substr(at + kName.size()));

@@ -19,6 +19,8 @@
 
 namespace supertac {
 
+constexpr int kAttempts = 6;  ///< at an answer that is not damaged
+
 /// Firmware facts from M115.
 struct MarlinCapabilities {
   std::string firmware;           ///< the text of FIRMWARE_NAME

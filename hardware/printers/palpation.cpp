@@ -23,7 +23,7 @@ const char* name_of(Phase phase) {
 
 bool reachable(double speed, const PositionSample& from, const PositionSample& to) {
   const double seconds = 1.05 * (to.time_s - from.time_s) + 0.5 * (from.round_trip_s + to.round_trip_s);
-  return to.time_s > from.time_s && distance(from.position, to.position) < speed * seconds + 0.05;
+  return to.time_s > from.time_s && distance(from.position, to.position) < speed * seconds + kToleranceMm;
 }
 
 double ordered_s(const Leg& leg) { return distance(leg.from, leg.to) / leg.speed; }

@@ -10,8 +10,6 @@
 namespace supertac {
 namespace {
 
-constexpr double kToleranceMm = 0.05;
-constexpr int kAttempts = 6;  // at an answer that is not damaged
 constexpr double kHomeDeadline = 180, kStopDeadline = 3, kPollDeadline = 0.25;
 constexpr double kPrompt = 0.1;    // of an answer, where it must come before the head starts
 constexpr double kMoveMargin = 8;  // start delay, acceleration, and a firmware that is slower than ordered

@@ -12,6 +12,8 @@ namespace supertac {
 
 constexpr double kStopWithin = 1.6;  ///< s, of the 2 in which Ctrl-C ends a program; M410 takes one of them
 
+constexpr double kToleranceMm = 0.05;  ///< positions so near are the same: answers are rounded
+
 /// The line that makes a straight move, and the one that says where the head is.
 std::string move_command(const Point3& target, double speed_mm_s);
 std::string origin_command(const Point3& here);

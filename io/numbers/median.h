@@ -22,4 +22,10 @@ auto median(Range&& values) {
   return quantile(values, 0.5);
 }
 
+/// The standard deviation of normal numbers, from their distances from their median; reorders these.
+template <class Range>
+double normal_deviation(Range&& distances) {
+  return 1.4826 * median(distances);
+}
+
 }  // namespace supertac

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string_view>
 
 namespace supertac {
 
@@ -14,6 +15,13 @@ std::array<std::uint32_t, 4> philox(std::array<std::uint32_t, 4> counter, std::a
 /// The standard normal distribution's inverse, p in (0, 1), relative error about 1e-16: algorithm AS 241,
 /// PPND16 (Wichura 1988). Uses +, -, *, / and sqrt only, so that the bits do not depend on the C library.
 double inverse_normal(double p);
+
+/// The letters of a short name as one number, the last the lowest byte: which stream it is.
+constexpr std::uint64_t stream_named(std::string_view name) {
+  std::uint64_t number = 0;
+  for (const char letter : name) number = number << 8 | static_cast<unsigned char>(letter);
+  return number;
+}
 
 /// A stream of random numbers: a pure function of (seed, stream, counter). The three methods draw from the
 /// same words; use different counters (or streams) for numbers that have to be independent.

@@ -27,7 +27,7 @@ inline Recording make_recording(const PassPlan& plan) {
   for (std::size_t i = 0; i < plan.frames; ++i) {
     const double t = static_cast<double>(i) / plan.rate_hz;
     recording.time_s.push_back(t);
-    for (int k = 0; k < kTaxels; ++k)
+    for (int k = 0; k < rig::kTaxels; ++k)
       recording.signals.push_back(plan.level + 0.001F * static_cast<float>(i) +
                                   0.0001F * static_cast<float>(k));
     recording.position_mm.push_back(18.0F);

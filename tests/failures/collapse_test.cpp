@@ -41,7 +41,7 @@ class CollapseTest : public ::testing::Test {
 
  private:
   Tensor two_windows() const {
-    Tensor two(Shape{2, static_cast<Dim>(windows.frames()), kTaxels});
+    Tensor two(Shape{2, static_cast<Dim>(windows.frames()), rig::kTaxels});
     const auto half = static_cast<std::size_t>(two.size() / 2);
     windows.window(0, two.values().first(half));
     windows.window(windows.size() / 4, two.values().last(half));
@@ -101,7 +101,7 @@ double largest_eigenvalue(const WindowSet& windows) {
   std::vector<double> rows, mean(entries), v(entries, 1);
   for (std::size_t i = 0; i < windows.size(); ++i) {
     for (std::size_t e = 0; e < entries; ++e) {
-      rows.push_back(static_cast<double>(windows.window(i)[e / 4 * kTaxels + 12 + e % 4]));
+      rows.push_back(static_cast<double>(windows.window(i)[e / 4 * rig::kTaxels + 12 + e % 4]));
       mean[e] += rows.back() / n;
     }
   }

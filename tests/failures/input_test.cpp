@@ -24,7 +24,7 @@ Recording recording(F spoil, int trial = 1, std::size_t frames = 150) {
     const double t = static_cast<double>(i) / 300;
     r.time_s.push_back(t);
     r.position_mm.insert(r.position_mm.end(), {18, static_cast<float>(36 + 10 * t)});
-    for (int k = 0; k < kTaxels; ++k) {
+    for (int k = 0; k < rig::kTaxels; ++k) {
       r.signals.push_back(static_cast<float>(2.3 + (0.1 + 0.01 * trial) * std::sin(20 * t + 0.3 * k)));
     }
   }
@@ -52,7 +52,7 @@ bool all_in_range(const WindowSet& windows) {
 }
 
 TEST(Failures, F11ANanInARecordingIsDroppedAndCounted) {
-  const Recording spoilt = recording([](Recording& r) { r.signals[50 * kTaxels + 3] = kNan; });
+  const Recording spoilt = recording([](Recording& r) { r.signals[50 * rig::kTaxels + 3] = kNan; });
   const WindowSet windows = windows_of({spoilt});
   EXPECT_EQ(windows.counts().damaged, 1U);
   EXPECT_TRUE(all_in_range(windows));
@@ -80,7 +80,7 @@ TEST(Failures, F11ConstantClippedAndDeadSignalsTrainToFiniteNumbers) {
   const auto constant = [](Recording& r) { std::fill(r.signals.begin(), r.signals.end(), 2.4F); };
   const auto clipped = [](Recording& r) { std::fill(r.signals.begin(), r.signals.end(), 0.0F); };
   const auto dead_taxel = [](Recording& r) {
-    for (std::size_t i = 5; i < r.signals.size(); i += kTaxels) r.signals[i] = 2.46F;
+    for (std::size_t i = 5; i < r.signals.size(); i += rig::kTaxels) r.signals[i] = 2.46F;
   };
   const WindowSet windows =
       windows_of({recording(constant), recording(clipped, 2), recording(dead_taxel, 3)});

@@ -85,7 +85,7 @@ inline WindowSet small_windows(const SuperTacSettings& model, std::size_t frames
       const double y = 36 + 10 * static_cast<double>(i) / 300;
       r.time_s.push_back(static_cast<double>(i) / 300);
       r.position_mm.insert(r.position_mm.end(), {18, static_cast<float>(y)});
-      for (int k = 0; k < kTaxels; ++k) {
+      for (int k = 0; k < rig::kTaxels; ++k) {
         const double height = plate.height(18, y - 4.5 + 3 * (k / 4));
         r.signals.push_back(static_cast<float>(2.44 - 0.1 * height - 0.002 * ((trial + k) % 3)));
       }

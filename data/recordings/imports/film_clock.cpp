@@ -13,7 +13,6 @@ namespace supertac {
 namespace {
 
 constexpr double kCoarseS = 0.05, kFineS = 0.01;
-constexpr double kLeastS = 5;
 
 // A course on even steps from its first time on, scaled to 0 to 1.
 struct Even {
@@ -87,7 +86,7 @@ std::vector<Place> tried(const Even& sensor, const Even& film, double around_s, 
         const double t = middle_s + around_s + shift + rate * (film.time(i) - middle_s);
         if (sensor.holds(t)) sums.add(sensor.at(t), film.load[i]);
       }
-      if (sums.n * film.step_s >= kLeastS &&
+      if (sums.n * film.step_s >= kFarthestS &&
           2 * sums.n >= static_cast<double>(std::min(film.load.size(), sensor.load.size())))
         places.push_back({around_s + shift, rate, sums.correlation()});
     }
@@ -169,7 +168,7 @@ Refined refine(const Even& sensor, const Even& film, double middle_s, const Plac
     }
     const Vector step = solved(normal, right);
     for (std::size_t a = 0; a < kUnknowns; ++a) unknown[a] += step[a];
-    if (!sizes.empty()) deviation = std::max(1e-6, median(sizes) / 0.6745);
+    if (!sizes.empty()) deviation = std::max(1e-6, normal_deviation(sizes));
   }
   // Jackknife: how far each second moves what the others say. Of a short film each of few touches has weight.
   double of_shift = 0, of_rate = 0;
@@ -198,8 +197,8 @@ std::string FilmClock::text() const {
 
 FilmClock find_film_clock(const LoadCourse& sensor, const LoadCourse& film) {
   for (const LoadCourse* course : {&sensor, &film})
-    if (course->time_s.size() < 10 || course->time_s.back() - course->time_s.front() < kLeastS)
-      refuse("fewer than 5 s were recorded");
+    if (course->time_s.size() < 10 || course->time_s.back() - course->time_s.front() < kFarthestS)
+      refuse("fewer than " + format(kFarthestS) + " s were recorded");
   const Even coarse_sensor(sensor, kCoarseS), coarse_film(film, kCoarseS);
   if (touches_in(coarse_sensor) < 3 || touches_in(coarse_film) < 3) refuse("fewer than three touches");
   const double middle = (film.time_s.front() + film.time_s.back()) / 2;
@@ -207,7 +206,7 @@ FilmClock find_film_clock(const LoadCourse& sensor, const LoadCourse& film) {
       sensor.time_s.front() < film.time_s.back() && film.time_s.front() < sensor.time_s.back();
   const double around = overlap ? 0 : sensor.time_s.front() - film.time_s.front();
   const std::vector<Place> places = tried(coarse_sensor, coarse_film, around, middle);
-  if (places.empty()) refuse("they have fewer than 5 s in common");
+  if (places.empty()) refuse("they have fewer than " + format(kFarthestS) + " s in common");
   const Place best = *std::ranges::max_element(places, {}, &Place::correlation);
   for (const Place& other : places)
     if (std::abs(other.offset_s - best.offset_s) > 0.4 && other.correlation > 0.93 * best.correlation)

@@ -28,9 +28,9 @@ struct LoadCourse {
 /// where the clocks overlap already, from none) and every rate within kMostRate of 1 is tried on steps of 50
 /// ms; the best is refined by Gauss-Newton steps with the load's own slope, pixels of time weighted by a
 /// Huber norm of three deviations. The deviations of shift and rate are a jackknife's over seconds of the
-/// film. Throws std::runtime_error, saying why, where the courses do not agree: fewer than three touches or 5
-/// s in common, correlation below 0.8, another place nearly as good, or a time that stays uncertain by more
-/// than 4 ms or .04 %.
+/// film. Throws std::runtime_error, saying why, where the courses do not agree: fewer than three touches, or
+/// less in common than kFarthestS, correlation below 0.8, another place nearly as good, or a time that stays
+/// uncertain by more than 4 ms or .04 %.
 FilmClock find_film_clock(const LoadCourse& sensor, const LoadCourse& film);
 constexpr double kFarthestS = 5, kMostRate = 0.025;
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "data/frames/probe.h"
 #include "data/frames/text_grammar.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
@@ -17,7 +18,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 constexpr std::uint64_t kMaxBytes = std::uint64_t{4} << 30;
-constexpr std::size_t kMostColumns = std::size_t{1} << 20;
 
 // --- NumPy's files: "\x93NUMPY", version, length of the header, a Python dictionary, the values.
 
@@ -90,9 +90,9 @@ Table numpy_table(const std::string& path, FileReader& file) {
   table.shape.assign(shape.begin() + 1, shape.end());
   table.columns = 1;
   for (const std::size_t side : table.shape) {
+    if (side > kMaxBytes / sizeof(double) / table.columns)
+      refuse("has more than " + std::to_string(kMaxBytes / sizeof(double)) + " numbers in a row");
     table.columns *= side;
-    if (table.columns > kMostColumns)
-      refuse("has more than " + std::to_string(kMostColumns) + " numbers in a row");
   }
   const std::uint64_t left = file.size() - prefix - length;
   const std::size_t row_bytes = table.columns * number->second.bytes;
@@ -120,6 +120,25 @@ bool holds_row(std::string_view line) {
   return !content.empty() && content.front() != '#';
 }
 
+/// What a file without a grammar of numbers is, as the end of a sentence.
+std::string other_than_table(const std::string& whole) {
+  const Heard heard{0, whole.substr(0, 1 << 16)};
+  const ProbeReport report = probe({&heard, 1}, "-", {});
+  const auto guess = std::ranges::find_if(
+      report.says, [](const std::string& line) { return line.starts_with("it may be: "); });
+  const std::string& why = guess != report.says.end() ? *guess : report.says.back();
+  if (!report.draft)
+    return "holds no line of numbers (" + why.substr(0, why.find(';')) +
+           "); expected a row a line, separated by commas, tabs or blanks";
+  const FrameKind kind = report.draft->frame.kind;
+  return std::string("holds no table but ") +
+         (kind == FrameKind::json    ? "objects of JSON"
+          : kind == FrameKind::board ? "frames of the rig's board"
+                                     : "binary frames") +
+         "; supertac-stream --sensor FILE --record DIR reads them, where \"port\" of the sensor's file is "
+         "this one";
+}
+
 Table text_table(const std::string& path) {
   const std::string whole = read_text_file(path, kMaxBytes);
   std::string_view text = whole;
@@ -131,9 +150,7 @@ Table text_table(const std::string& path) {
   std::vector<std::string> learnt;
   while (!text.empty() && learnt.size() < 2000) learnt.emplace_back(next());
   const std::optional<TextGrammar> grammar = find_grammar(learnt);
-  if (!grammar)
-    throw FileError(path,
-                    "holds no line of numbers; expected a row a line, separated by commas, tabs or blanks");
+  if (!grammar) throw FileError(path, other_than_table(whole));
   if (!grammar->doubt.empty()) throw FileError(path, "two readings explain it alike: " + grammar->doubt);
   Table table;
   table.columns = grammar->columns.size(), table.shape = {table.columns};
@@ -165,10 +182,17 @@ Table text_table(const std::string& path) {
       ++table.dropped;
     }
   }
-  if (table.dropped * 10 > table.rows() + table.dropped)
+  if (table.dropped * 10 > table.rows() + table.dropped) {
+    // A line's end among other bytes makes no text of them.
+    const auto control = [](char c) {
+      return c > 0 && c < ' ' && std::string_view("\t\n\r\x1B").find(c) == std::string_view::npos;
+    };
+    if (50 * std::ranges::count_if(whole, control) > std::ssize(whole))
+      throw FileError(path, other_than_table(whole));
     throw FileError(path, std::to_string(table.dropped) + " of " + std::to_string(lines) + " lines are not " +
                               std::to_string(table.columns) +
                               " numbers, expected at most a tenth; is it a table of numbers?");
+  }
   return table;
 }
 

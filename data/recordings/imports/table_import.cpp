@@ -15,14 +15,6 @@
 namespace supertac {
 namespace {
 
-double unit_s(const std::string& unit) {
-  if (unit == "s") return 1;
-  if (unit == "ms") return 1e-3;
-  if (unit == "us") return 1e-6;
-  if (unit == "ns") return 1e-9;
-  throw std::invalid_argument("time is in " + in_quotes(unit) + ", expected s, ms, us or ns");
-}
-
 /// The columns that "8-71", "s0-s63" or a single name stand for.
 void append_columns(const Table& table, const std::string& text, std::vector<std::size_t>& columns) {
   // A name may hold a '-' of its own.
@@ -41,8 +33,7 @@ void append_columns(const Table& table, const std::string& text, std::vector<std
 }
 
 struct Columns {
-  static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
-  std::size_t time = kNone, x = kNone, y = kNone;
+  std::optional<std::size_t> time, x, y;
   std::vector<std::size_t> values;
 };
 
@@ -61,7 +52,7 @@ Columns columns_of(const Table& table, const ColumnMap& map, const Sensor& senso
     columns = {};
   }
   const auto find = [&](const std::string& name) {
-    return name.empty() ? Columns::kNone : table.column(name);
+    return name.empty() ? std::nullopt : std::optional(table.column(name));
   };
   columns.time = find(map.time), columns.x = find(map.x), columns.y = find(map.y);
   for (const std::string& text : map.values) append_columns(table, text, columns.values);
@@ -74,8 +65,8 @@ Columns columns_of(const Table& table, const ColumnMap& map, const Sensor& senso
                                 ": name them, --columns values=FIRST-LAST, and time=, x=, y=");
   std::set<std::size_t> named(columns.values.begin(), columns.values.end());
   std::size_t count = columns.values.size();
-  for (const std::size_t c : {columns.time, columns.x, columns.y})
-    if (c != Columns::kNone) named.insert(c), ++count;
+  for (const auto& c : {columns.time, columns.x, columns.y})
+    if (c) named.insert(*c), ++count;
   if (named.size() != count)
     throw std::invalid_argument("a column has two meanings: expected one of time, x, y and values for each");
   return columns;
@@ -131,8 +122,8 @@ double ran_over(double before, double now, double most) {
   return 0;
 }
 
-std::vector<double> times_of(const std::string& path, const Table& table, std::size_t column, double unit,
-                             double rate_hz) {
+std::vector<double> times_of(const std::string& path, const Table& table, std::optional<std::size_t> column,
+                             double unit, double rate_hz) {
   // A line that was dropped leaves its time empty.
   const auto number = [&](std::size_t i) {
     return table.places.empty() ? i : table.places[i] - table.places[0];
@@ -141,30 +132,29 @@ std::vector<double> times_of(const std::string& path, const Table& table, std::s
   const double most = std::max(1.0, 10 / rate_hz) / unit;
   double over = 0;
   for (std::size_t i = 0; i < table.rows(); ++i) {
-    if (column != Columns::kNone && i > 0)
-      over += ran_over(table.row(i - 1)[column], table.row(i)[column], most);
-    const double t = column == Columns::kNone ? static_cast<double>(number(i)) / rate_hz
-                                              : (table.row(i)[column] + over) * unit;
+    if (column && i > 0) over += ran_over(table.row(i - 1)[*column], table.row(i)[*column], most);
+    const double t =
+        column ? (table.row(i)[*column] + over) * unit : static_cast<double>(number(i)) / rate_hz;
     if (!std::isfinite(t))
-      throw FileError(path, name_of(table, column) + " as time: no number in " + place(table, i));
+      throw FileError(path, name_of(table, *column) + " as time: no number in " + place(table, i));
     if (i > 0 && t < time_s.back())
-      throw FileError(path, name_of(table, column) + " as time falls in " + place(table, i) + ", from " +
-                                format(table.row(i - 1)[column]) + " to " + format(table.row(i)[column]) +
+      throw FileError(path, name_of(table, *column) + " as time falls in " + place(table, i) + ", from " +
+                                format(table.row(i - 1)[*column]) + " to " + format(table.row(i)[*column]) +
                                 "; name another column, --columns time=NAME");
     time_s.push_back(t);
   }
-  if (column == Columns::kNone || time_s.size() < 2) return time_s;
+  if (!column || time_s.size() < 2) return time_s;
   const double span = time_s.back() - time_s.front();
   spread_equal_stamps(time_s, span > 0 ? span / static_cast<double>(time_s.size() - 1) : 1);
   return time_s;
 }
 
-void check_rate(const std::string& path, const Table& table, std::size_t column, const Recording& recording,
-                double rate_hz) {
-  if (column == Columns::kNone || recording.frames() < 2) return;
+void check_rate(const std::string& path, const Table& table, std::optional<std::size_t> column,
+                const Recording& recording, double rate_hz) {
+  if (!column || recording.frames() < 2) return;
   const double found = 1 / recording.period_s();
   if (!(found > 0.5 * rate_hz && found < 2 * rate_hz))
-    throw FileError(path, name_of(table, column) + " as time has " + format(found, 1) +
+    throw FileError(path, name_of(table, *column) + " as time has " + format(found, 1) +
                               " frames/s, the sensor is said to send " + format(rate_hz, 1) +
                               "; is it in s, ms or us (--columns time=NAME:ms)?");
 }
@@ -211,7 +201,7 @@ ColumnMap column_map(const std::string& text) {
           "found " + in_quotes(entry) +
           ", expected time=COLUMN[:s|ms|us|ns], x=COLUMN, y=COLUMN, values=FIRST-LAST");
     if (const std::size_t colon = value.rfind(':'); key == "time" && colon != std::string::npos) {
-      map.time_unit_s = unit_s(value.substr(colon + 1));
+      map.time_unit_s = unit_of_time(value.substr(colon + 1));
       value.resize(colon);
     }
     if (key == "values") {
@@ -237,8 +227,7 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
     throw FileError(path, error.what());
   }
   Recording recording;
-  const double unit =
-      columns.time != Columns::kNone && map.time.empty() ? sensor.frame.time->unit_s : map.time_unit_s;
+  const double unit = columns.time && map.time.empty() ? sensor.frame.time->unit_s : map.time_unit_s;
   recording.array = sensor.array, recording.signal_scale = sensor.scale;
   recording.body = sensor.body, recording.source = "imported";
   recording.time_s = times_of(path, table, columns.time, unit, sensor.rate_hz);
@@ -261,8 +250,8 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
     const auto frame = std::span(recording.signals).subspan(i * signals, signals);
     sensor.arrange(sent, frame);
     rest.follow(recording.time_s[i], frame);
-    if (columns.x == Columns::kNone) continue;
-    for (const std::size_t column : {columns.x, columns.y})
+    if (!columns.x) continue;
+    for (const std::size_t column : {*columns.x, *columns.y})
       recording.position_mm.push_back(checked_mm(path, table, column, table.row(i)[column]));
   }
   return recording;

@@ -25,13 +25,13 @@ std::string_view next_column(std::string_view& line) {
   return column;
 }
 
-Line parse_line(std::string_view line, std::array<float, kTaxels>& volts) {
+Line parse_line(std::string_view line, std::array<float, rig::kTaxels>& volts) {
   std::size_t columns = 0;
   bool numeric = true;
   bool finite = true;
   bool in_range = true;
   for (auto column = next_column(line); !column.empty(); column = next_column(line), ++columns) {
-    if (columns >= kTaxels) return &ImportReport::too_many;
+    if (columns >= rig::kTaxels) return &ImportReport::too_many;
     const auto value = parse_double(column);
     numeric = numeric && value.has_value();
     if (!value) continue;
@@ -40,7 +40,7 @@ Line parse_line(std::string_view line, std::array<float, kTaxels>& volts) {
     volts[columns] = static_cast<float>(*value);
   }
   if (columns == 0) return &ImportReport::empty;
-  if (columns < kTaxels) return &ImportReport::too_few;
+  if (columns < rig::kTaxels) return &ImportReport::too_few;
   if (!numeric) return &ImportReport::not_numeric;
   if (!finite) return &ImportReport::non_finite;
   return in_range ? &ImportReport::frames : &ImportReport::out_of_range;
@@ -69,7 +69,7 @@ Recording import_text_pass(const std::string& path, ImportReport& report) {
   recording.source = "imported";
   recording.metadata["time_base"] = "nominal";
   recording.metadata["filter_s"] = format(rig::kFilterS);
-  std::array<float, kTaxels> volts{};
+  std::array<float, rig::kTaxels> volts{};
   for (std::string_view rest = text; !rest.empty();) {
     const std::string_view line = rest.substr(0, rest.find('\n'));
     rest.remove_prefix(std::min(rest.size(), line.size() + 1));

@@ -31,10 +31,10 @@ struct Form {
   bool may_be_none = false;  // not every array has it: what cannot be told is left out
 };
 double exp_of(double form) { return same_bits::exp(form); }
-constexpr double kLogFifth = -1.6094, kLogThreeHalves = 0.4055, kLogHundredth = -4.6052, kLogTen = 2.3026;
 // Of a knee k, 1 / (1 + k) is 0 for a linear response and tends to 1 where the lightest touch saturates.
 const Form kForms[] = {
-    {"skin_mm", kLogFifth, kLogThreeHalves, [](Body& b, double f, double p) { b.skin_mm = p * exp_of(f); },
+    {"skin_mm", same_bits::log(0.2), same_bits::log(1.5),
+     [](Body& b, double f, double p) { b.skin_mm = p * exp_of(f); },
      [](double f, double p) { return p * exp_of(f); }},
     {"knee", 0.001, 0.85, [](Body& b, double f, double) { b.knee = (1 - f) / f; },
      [](double f, double) { return (1 - std::clamp(f, 0.001, 0.95)) / std::clamp(f, 0.001, 0.95); }},
@@ -42,12 +42,13 @@ const Form kForms[] = {
      [](double f, double) { return std::max(0.0, f); }, true},
     {"crosstalk_columns", 0, 0.5, [](Body& b, double f, double) { b.crosstalk_columns = f; },
      [](double f, double) { return std::max(0.0, f); }, true},
-    {"hysteresis_s", kLogHundredth, 0, [](Body& b, double f, double) { b.hysteresis_s = exp_of(f); },
+    {"hysteresis_s", same_bits::log(0.01), 0, [](Body& b, double f, double) { b.hysteresis_s = exp_of(f); },
      [](double f, double) { return exp_of(f); }},
     {"creep", 0.001, 0.4, [](Body& b, double f, double) { b.creep = f; },
      [](double f, double) { return std::max(0.001, f); }, true},
-    {"creep_s", -0.6931, kLogTen, [](Body& b, double f, double) { b.creep_s = exp_of(f); },
-     [](double f, double) { return exp_of(f); }, true}};
+    {"creep_s", same_bits::log(0.5), same_bits::log(10),
+     [](Body& b, double f, double) { b.creep_s = exp_of(f); }, [](double f, double) { return exp_of(f); },
+     true}};
 constexpr std::size_t kNumbers = std::size(kForms);
 
 // A number that the file states without an uncertainty is known, and is not looked for.
@@ -215,8 +216,7 @@ BodyFitter::BodyFitter(const Sensor& sensor, std::uint64_t seed) : sensor_(senso
   const double pitch = std::sqrt(sensor.array.pitch_mm.x * sensor.array.pitch_mm.y);
   std::vector<std::vector<double>> statistics(kSimulations), forms(kSimulations);
   parallel_for(kSimulations, [&](std::size_t i) {
-    constexpr std::uint64_t kStream = 0x626f6479ULL;  // "body"
-    const RandomStream random(seed, kStream);
+    const RandomStream random(seed, stream_named("body"));
     Sensor drawn = sensor;
     drawn.body.uncertainty = {};
     for (std::size_t k = 0; k < kNumbers; ++k) {

@@ -15,8 +15,6 @@ namespace {
 
 // Counters within one sample's stream: each term has its own, as many as there are signals.
 enum Term : std::uint64_t { kGain, kTaxelGain, kOffset, kDropCount, kDropChoice, kNoiseKey, kLift };
-constexpr std::size_t kMostTaxels = 64 * 64;
-constexpr std::uint64_t kAugmentStream = 0x617567ULL << 40;  // keeps clear of the streams other code uses
 
 double factor(double magnitude, double uniform) {
   const double v = 2 * uniform - 1;
@@ -32,14 +30,14 @@ float rough_normal(std::uint64_t bits) {
   return (static_cast<float>(sum) - kMean) * kPerUnit;
 }
 
-// Which taxels are dropped: the first `count` of a random order.
-std::array<bool, kMostTaxels> choose_dropped(int at_most, const TaxelArray& array,
-                                             const RandomStream& random) {
-  std::array<bool, kMostTaxels> dropped{};
+// Which taxels are dropped, of all: the first `count` of a random order.
+void choose_dropped(int at_most, const TaxelArray& array, const RandomStream& random,
+                    std::vector<char>& dropped) {
+  thread_local std::vector<std::size_t> order;
   const std::uint64_t signals = array.signals();
   const int count = static_cast<int>(random.uniform(kDropCount * signals) * (at_most + 1));
-  std::array<std::size_t, kMostTaxels> order;
   const auto taxels = static_cast<std::size_t>(array.taxels());
+  dropped.assign(taxels, false), order.resize(taxels);
   for (std::size_t k = 0; k < taxels; ++k) order[k] = k;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const auto left = static_cast<double>(taxels - i);
@@ -47,7 +45,6 @@ std::array<bool, kMostTaxels> choose_dropped(int at_most, const TaxelArray& arra
               order[i + static_cast<std::size_t>(random.uniform(kDropChoice * signals + i) * left)]);
     dropped[order[i]] = true;
   }
-  return dropped;
 }
 
 }  // namespace
@@ -71,18 +68,19 @@ void check(const AugmentSettings& settings, const TaxelArray& array) {
 void augment(const AugmentSettings& settings, std::uint64_t seed, std::uint64_t sample,
              std::span<float> window, const TaxelArray& array) {
   const std::size_t signals = array.signals();
-  if (signals > kMostSignals || window.size() % signals != 0)
+  if (window.size() % signals != 0)
     throw std::invalid_argument("augment: a window of " + array.text() + " is [T][" +
                                 std::to_string(signals) + "], got " + std::to_string(window.size()) +
                                 " values");
   if (!settings.any()) return;
   check(settings, array);
-  const RandomStream random(seed, kAugmentStream ^ sample);
-  const auto dropped = choose_dropped(settings.dropped, array, random);
+  const RandomStream random(seed, stream_named("aug") << 40 ^ sample);  // clear of the streams of others
   const auto lift = static_cast<float>(settings.lift * random.uniform(kLift * signals));
   const double window_gain = factor(settings.gain, random.uniform(kGain));
   // Too large for the stack of a small thread, and not to be taken anew for every window.
   thread_local std::vector<float> gain, offset, top;
+  thread_local std::vector<char> dropped;
+  choose_dropped(settings.dropped, array, random, dropped);
   for (std::vector<float>* values : {&gain, &offset, &top}) values->resize(signals);
   for (std::size_t k = 0; k < signals; ++k) {
     const double own = factor(settings.taxel_gain, random.uniform(kTaxelGain * signals + k));

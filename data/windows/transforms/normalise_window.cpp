@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -10,7 +11,6 @@ namespace supertac {
 namespace {
 
 constexpr std::size_t kBins = 256;
-constexpr std::size_t kMostFrames = 60'000;
 
 struct Range {
   float rest, top;
@@ -24,8 +24,7 @@ Range range_of(std::span<const std::uint16_t, kBins> counts, std::size_t frames)
   }
   for (std::size_t n = counts[top]; n < above; n += counts[--top]) {
   }
-  constexpr float kStep = 1.0F / kBins;
-  return {static_cast<float>(rest) * kStep, static_cast<float>(top) * kStep};
+  return {static_cast<float>(rest) / kBins, static_cast<float>(top) / kBins};
 }
 
 constexpr std::size_t kAtOnce = 16;
@@ -50,10 +49,11 @@ std::array<Range, kAtOnce> ranges_of(std::span<const float> window, std::size_t 
 }  // namespace
 
 void normalise_window(std::span<float> window, std::size_t taxels) {
-  if (taxels == 0 || window.empty() || window.size() % taxels != 0 || window.size() / taxels > kMostFrames)
+  if (taxels == 0 || window.empty() || window.size() % taxels != 0 ||
+      window.size() / taxels > std::numeric_limits<std::uint16_t>::max())
     throw std::invalid_argument("normalise_window: a window is [T][" + std::to_string(taxels) +
-                                "], T up to " + std::to_string(kMostFrames) + ", got " +
-                                std::to_string(window.size()) + " values");
+                                "], T up to " + std::to_string(std::numeric_limits<std::uint16_t>::max()) +
+                                ", got " + std::to_string(window.size()) + " values");
   float gain = kLeastGain;
   for (std::size_t first = 0; first < taxels; first += kAtOnce) {
     const std::size_t count = std::min(kAtOnce, taxels - first);

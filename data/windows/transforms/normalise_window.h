@@ -25,7 +25,7 @@ constexpr std::size_t kTopRank = 3;     ///< two samples may lie above the top: 
 /// rest_k, 7 % so). Percentiles are taken in steps of 1/256. Nothing but the window is used: a live window is
 /// normalised like one of training, and no state has to settle after a start. What is lost is how hard the
 /// finger is pressed. `window`: [T][taxels], values in [0,1]. Throws std::invalid_argument when the window is
-/// empty, no multiple of `taxels`, or of over 60,000 samples.
+/// empty, no multiple of `taxels`, or of over 65,535 samples.
 void normalise_window(std::span<float> window, std::size_t taxels);
 
 }  // namespace supertac

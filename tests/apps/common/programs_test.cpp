@@ -19,7 +19,7 @@ constexpr std::uint64_t kPlenty = 1 << 26;
 std::string rest_lines(int count) {
   std::string text;
   for (int i = 0; i < count; ++i) {
-    for (int k = 0; k < kTaxels; ++k) text += "2.4" + std::to_string((i + k) % 3) + " ";
+    for (int k = 0; k < rig::kTaxels; ++k) text += "2.4" + std::to_string((i + k) % 3) + " ";
     text += "\n";
   }
   return text;

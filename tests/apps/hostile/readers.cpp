@@ -69,7 +69,7 @@ std::string numpy_file() {
 Recording short_recording() {
   constexpr std::size_t kFrames = 40;
   Recording recording = simulate_pass(Plate::named("plain"), {.from_mm = 50, .to_mm = 52});
-  recording.time_s.resize(kFrames), recording.signals.resize(kFrames * kTaxels);
+  recording.time_s.resize(kFrames), recording.signals.resize(kFrames * rig::kTaxels);
   recording.position_mm.resize(2 * kFrames), recording.lift_mm.resize(kFrames);
   return recording;
 }

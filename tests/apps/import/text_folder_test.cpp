@@ -26,7 +26,7 @@ std::vector<ImportedPass> import_all(const std::string& root, const FolderImport
 std::string as_text(const Recording& recording) {
   std::string text;
   for (std::size_t i = 0; i < recording.signals.size(); ++i)
-    text += std::to_string(recording.signals[i]) + (i % kTaxels == kTaxels - 1 ? "\n" : " ");
+    text += std::to_string(recording.signals[i]) + (i % rig::kTaxels == rig::kTaxels - 1 ? "\n" : " ");
   return text;
 }
 

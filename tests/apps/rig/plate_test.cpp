@@ -43,7 +43,7 @@ TEST_F(PlateProgram, APrintedPlateIsSimulatedAndImportedLikeANamedOne) {
   // The same pass as the rig's text, in a folder named like the plate's file.
   std::string text;
   for (std::size_t i = 0; i < recording.signals.size(); ++i)
-    text += std::to_string(recording.signals[i]) + (i % kTaxels == kTaxels - 1 ? "\n" : " ");
+    text += std::to_string(recording.signals[i]) + (i % rig::kTaxels == rig::kTaxels - 1 ? "\n" : " ");
   make_directories(path("text/my/1"));
   write_file(path("text/my/1/1.txt"), text);
   std::filesystem::copy(path("my.stl"), path("text/my.stl"));

@@ -51,7 +51,8 @@ TEST_F(RigTest, CollectShowsALiveLineAndReportsEveryPass) {
   EXPECT_EQ(pass["frames"], recording.frames());
   EXPECT_EQ(recording.plate, "my.stl");
   // At first the finger is in the air: at rest, however long this machine has been running.
-  for (std::size_t k = 0; k < kTaxels; ++k) EXPECT_NEAR(recording.signals[k], 2.44, 0.05) << "taxel " << k;
+  for (std::size_t k = 0; k < rig::kTaxels; ++k)
+    EXPECT_NEAR(recording.signals[k], 2.44, 0.05) << "taxel " << k;
   succeed("supertac-import --journal out/my.stl_t1_v50.journal --out saved");
   EXPECT_EQ(bytes("saved/my.stl"), bytes("my.stl"));
   // The folder holds its plate: truths can be drawn wherever it is moved.

@@ -112,7 +112,7 @@ class LateBoard : public SensorSource {
   void finish() override {}
 
  private:
-  std::vector<float> volts_ = std::vector<float>(kTaxels, 2.3F);
+  std::vector<float> volts_ = std::vector<float>(rig::kTaxels, 2.3F);
   int frame_ = 0;
 };
 
@@ -165,7 +165,7 @@ TEST_F(Streaming, WrongUsageIsExitCode2) {
 TEST_F(Streaming, TooShortASignalSaysHowMuchIsNeeded) {
   Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = 32});
   recording.metadata.erase("filter_s");
-  recording.time_s.resize(20), recording.signals.resize(20 * kTaxels), recording.position_mm.resize(40);
+  recording.time_s.resize(20), recording.signals.resize(20 * rig::kTaxels), recording.position_mm.resize(40);
   recording.lift_mm.clear();
   write_recording(path("recording"), recording);
   expect_failure(stream("--recording recording"), 1, "no picture, expected 0.11 s of signal");

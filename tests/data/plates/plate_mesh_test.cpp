@@ -23,7 +23,7 @@ const std::vector<std::string>& plates() {
 }
 
 Plate read(const std::vector<Triangle>& solid, const std::string& name) {
-  return {name, std::make_shared<const HeightMap>(solid, Plate::kWidthMm, Plate::kLengthMm, name)};
+  return {name, std::make_shared<const HeightMap>(solid, rig::kPlateWidthMm, rig::kPlateLengthMm, name)};
 }
 
 // Every directed edge once, and its opposite once: closed, manifold, facing one way.

@@ -43,7 +43,7 @@ TEST(RandomPlate, HasEveryKindOfTextureWithinItsBounds) {
     EXPECT_GE(plate.min_height(), -3) << number;
     EXPECT_LE(plate.max_height(), 3) << number;
     EXPECT_GE(plate.texture_begin(), 0) << number;
-    EXPECT_LE(plate.texture_end(), Plate::kLengthMm) << number;
+    EXPECT_LE(plate.texture_end(), rig::kPlateLengthMm) << number;
     EXPECT_EQ(plate.height(18, 2), 0) << number;  // the onset is on the flat plate
     plain += plate.max_height() == 0 ? 1 : 0;
     two += plate.textures().size() == 2 ? 1 : 0;
@@ -66,8 +66,8 @@ TEST(RandomPlate, KnowsItsHeightExtentAndDirection) {
   for (std::uint32_t number = 0; number < 60; ++number) {
     const Plate plate = random_plate(number);
     double highest = 0;
-    for (double y = 0; y <= Plate::kLengthMm; y += 0.25)
-      for (double x = 0; x <= Plate::kWidthMm; x += 0.5) {
+    for (double y = 0; y <= rig::kPlateLengthMm; y += 0.25)
+      for (double x = 0; x <= rig::kPlateWidthMm; x += 0.5) {
         const double z = plate.height(x, y);
         highest = std::max(highest, z);
         if (z != 0) {

@@ -20,7 +20,7 @@ void remove_frame(Recording& recording, std::size_t i) {
     values.erase(first, first + static_cast<std::ptrdiff_t>(n));
   };
   at(recording.time_s, 1);
-  at(recording.signals, kTaxels);
+  at(recording.signals, rig::kTaxels);
   at(recording.position_mm, 2);
 }
 
@@ -51,17 +51,17 @@ TEST(Resample, AveragesWhatArrivedInAPeriod) {
   const Track track = resample(recording, kWideRange);
   ASSERT_EQ(track.frames(), 301U);
   // Period 10 is centred on frame 30 and holds 29, 30, 31.
-  EXPECT_NEAR(track.samples[10 * kTaxels], (*kWideRange.scaling)(2.0F + 0.030F), 1e-6);
+  EXPECT_NEAR(track.samples[10 * rig::kTaxels], (*kWideRange.scaling)(2.0F + 0.030F), 1e-6);
   EXPECT_NEAR(track.position_mm[2 * 10 + 1], 30 + 10.0 * 10 / 300, 1e-5);
 }
 
 TEST(Resample, LooksNoFurtherAheadThanHalfAPeriod) {
   const Recording recording = make_recording({.frames = 901, .rate_hz = 900});
   Recording changed = recording;
-  for (std::size_t i = 32 * kTaxels; i < changed.signals.size(); ++i) changed.signals[i] = 1.5F;
+  for (std::size_t i = 32 * rig::kTaxels; i < changed.signals.size(); ++i) changed.signals[i] = 1.5F;
   const Track before = resample(recording, kWideRange), after = resample(changed, kWideRange);
-  for (std::size_t i = 0; i < 11 * kTaxels; ++i) ASSERT_EQ(before.samples[i], after.samples[i]);
-  EXPECT_NE(before.samples[11 * kTaxels], after.samples[11 * kTaxels]);
+  for (std::size_t i = 0; i < 11 * rig::kTaxels; ++i) ASSERT_EQ(before.samples[i], after.samples[i]);
+  EXPECT_NE(before.samples[11 * rig::kTaxels], after.samples[11 * rig::kTaxels]);
 }
 
 TEST(Resample, HoldsALostSampleAndCountsIt) {
@@ -71,7 +71,7 @@ TEST(Resample, HoldsALostSampleAndCountsIt) {
   ASSERT_EQ(track.frames(), 100U);
   EXPECT_EQ(track.held, 1U);
   EXPECT_EQ(track.gaps, 0U);
-  EXPECT_EQ(track.samples[40 * kTaxels], track.samples[39 * kTaxels]);
+  EXPECT_EQ(track.samples[40 * rig::kTaxels], track.samples[39 * rig::kTaxels]);
   EXPECT_NEAR(track.position_mm[2 * 40 + 1], 30 + 10.0 * 40 / 300, 1e-4);  // the finger went on moving
   EXPECT_EQ(track.run.back(), 100U);
 }
@@ -100,7 +100,7 @@ TEST(Resample, CallsASilenceOfOverFiftyMillisecondsAGap) {
 
 TEST(Resample, TakesADamagedFrameAsLost) {
   Recording recording = make_recording({});
-  recording.signals[40 * kTaxels + 3] = std::numeric_limits<float>::quiet_NaN();
+  recording.signals[40 * rig::kTaxels + 3] = std::numeric_limits<float>::quiet_NaN();
   const Track track = resample(recording, kWideRange);
   EXPECT_EQ(track.damaged, 1U);
   EXPECT_EQ(track.held, 1U);

@@ -17,7 +17,7 @@ Recording even(double low, double high) {
   constexpr int kFrames = 64'000;
   for (int i = 0; i < kFrames; ++i) {
     recording.time_s.push_back(i / 1000.0);
-    for (int k = 0; k < kTaxels; ++k)
+    for (int k = 0; k < rig::kTaxels; ++k)
       recording.signals.push_back(static_cast<float>(low + (high - low) * i / (kFrames - 1)));
   }
   return recording;
@@ -72,12 +72,13 @@ TEST(SignalRange, SeesShortRecordingsWhole) {
   press.signal_scale = {.unit = "kPa", .rest = 0, .span = -1};
   for (int i = 0; i < 40; ++i) {
     press.time_s.push_back(i / 50.0);
-    press.signals.insert(press.signals.end(), kTaxels, static_cast<float>(0.5 * std::sin(3.14 * i / 40)));
+    press.signals.insert(press.signals.end(), rig::kTaxels,
+                         static_cast<float>(0.5 * std::sin(3.14 * i / 40)));
   }
   SignalRange range;
   for (int i = 0; i < 100; ++i) range.add(press);
   EXPECT_EQ(range.fitted().span, -1);
-  EXPECT_GE(range.values().size(), 100U * 16 * kTaxels);
+  EXPECT_GE(range.values().size(), 100U * 16 * rig::kTaxels);
 }
 
 TEST(SignalRange, CountsBothSides) {

@@ -51,7 +51,7 @@ SimulatorSettings clean() {
 double deepest(const Recording& recording, int taxel) {
   float lowest = 9;
   for (std::size_t i = 0; i < recording.frames(); ++i)
-    lowest = std::min(lowest, recording.signals[i * kTaxels + static_cast<std::size_t>(taxel)]);
+    lowest = std::min(lowest, recording.signals[i * rig::kTaxels + static_cast<std::size_t>(taxel)]);
   return 2.442 - lowest;
 }
 
@@ -140,8 +140,8 @@ TEST(Simulator, AThresholdTakesNoMoreThanItself) {
   const FingerModel every(plate, settings, {});
   settings.threshold_mm = 0.1;
   const FingerModel deaf(plate, settings, {});
-  std::vector<double> taken(kTaxels);
-  std::vector<int> silent(kTaxels);
+  std::vector<double> taken(rig::kTaxels);
+  std::vector<int> silent(rig::kTaxels);
   const std::vector<double> rest = deaf.volts({.x_mm = 18, .y_mm = 54, .z_mm = 5}, 0);
   for (const double z : {0.0, -0.02, -0.05, -0.1, -0.3, -1.0, -2.0}) {
     const FingerPose pose{.x_mm = 18, .y_mm = 54, .z_mm = z};
@@ -152,7 +152,7 @@ TEST(Simulator, AThresholdTakesNoMoreThanItself) {
       if (loads[k] > 0 && some[k] == rest[k]) ++silent[k];
     }
   }
-  EXPECT_GT(std::ranges::count_if(silent, [](int n) { return n > 0; }), kTaxels / 2);
+  EXPECT_GT(std::ranges::count_if(silent, [](int n) { return n > 0; }), rig::kTaxels / 2);
   for (std::size_t k = 0; k < taken.size(); ++k) {  // pressed harder still, nothing more is taken
     const FingerPose pose{.x_mm = 18, .y_mm = 54, .z_mm = -2.5};
     EXPECT_NEAR(deaf.volts(pose, 0)[k] - every.volts(pose, 0)[k], taken[k], 1e-12) << k;
@@ -175,9 +175,10 @@ TEST(Simulator, AFingerThatWandersRocksAsMuchAsSaid) {
       for (std::size_t i = 0; i < r.frames(); i += 3) {
         if (r.lift_mm[i] > 0) continue;
         double mean = 0, lines[4] = {};
-        for (std::size_t k = 0; k < kTaxels; ++k) {
-          const double load = (rig::kRestVolts - r.signals[i * kTaxels + k]) / settings.volts_per_load / 0.5;
-          mean += load / kTaxels;
+        for (std::size_t k = 0; k < rig::kTaxels; ++k) {
+          const double load =
+              (rig::kRestVolts - r.signals[i * rig::kTaxels + k]) / settings.volts_per_load / 0.5;
+          mean += load / rig::kTaxels;
           if (k / 4 == 0) lines[0] += load / 4;
           if (k / 4 == 3) lines[1] += load / 4;
           if (k % 4 == 0) lines[2] += load / 4;
@@ -247,7 +248,7 @@ TEST(Simulator, LossLeavesGapsInTheStampsNotInTheOrder) {
   settings.lost_fraction = 0.3;
   const Recording r = simulate_pass(Plate::named("bumps6"), {}, settings);
   EXPECT_LT(r.frames(), 3300u);
-  EXPECT_EQ(r.signals.size(), r.frames() * kTaxels);
+  EXPECT_EQ(r.signals.size(), r.frames() * rig::kTaxels);
   EXPECT_EQ(r.position_mm.size(), r.frames() * 2);
   EXPECT_EQ(r.lift_mm.size(), r.frames());
   for (std::size_t i = 1; i < r.frames(); ++i) EXPECT_GT(r.time_s[i], r.time_s[i - 1]);

@@ -91,8 +91,9 @@ std::size_t quiet_place(const Recording& recording, std::size_t lost) {
   for (std::size_t i = 0; i + lost < recording.frames(); ++i) {
     if (recording.position_mm[2 * i + 1] < 58 || recording.position_mm[2 * i + 1] > 70) continue;
     double change = 0;
-    for (std::size_t k = 0; k < kTaxels; ++k)
-      change += std::abs(recording.signals[(i + lost) * kTaxels + k] - recording.signals[i * kTaxels + k]);
+    for (std::size_t k = 0; k < rig::kTaxels; ++k)
+      change += std::abs(recording.signals[(i + lost) * rig::kTaxels + k] -
+                         recording.signals[i * rig::kTaxels + k]);
     if (change < least) least = change, quietest = i;
   }
   return quietest;
@@ -107,8 +108,8 @@ TEST(Alignment, ALongLossThatLeftNoStepIsFound) {
     auto& [recording, registration] = passes[which];
     const std::size_t lost = 400, at = quiet_place(recording, lost);
     const auto from = static_cast<std::ptrdiff_t>(at), to = static_cast<std::ptrdiff_t>(at + lost);
-    recording.signals.erase(recording.signals.begin() + from * kTaxels,
-                            recording.signals.begin() + to * kTaxels);
+    recording.signals.erase(recording.signals.begin() + from * rig::kTaxels,
+                            recording.signals.begin() + to * rig::kTaxels);
     recording.position_mm.erase(recording.position_mm.begin() + from * 2,
                                 recording.position_mm.begin() + to * 2);
     const double missing_s = recording.time_s[at + lost] - recording.time_s[at];
@@ -127,7 +128,7 @@ TEST(Alignment, DeadAndSaturatedTaxelsDoNotMoveAPass) {
   const double before = scatter(passes);
   std::vector<float>& volts = passes[4].recording.signals;
   for (std::size_t i = 0; i < volts.size(); ++i)
-    volts[i] = i % kTaxels < 5 ? 2.44F : std::max(volts[i], 2.3F);
+    volts[i] = i % rig::kTaxels < 5 ? 2.44F : std::max(volts[i], 2.3F);
   align(passes);
   EXPECT_LT(scatter(passes), before + 0.03);
 }

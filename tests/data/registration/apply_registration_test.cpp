@@ -30,7 +30,7 @@ Recording step_at_frame_5() {
   recording.pass = 2;
   for (int i = 0; i < 10; ++i) {
     recording.time_s.push_back(0.25 * i);
-    recording.signals.insert(recording.signals.end(), kTaxels, i < 5 ? 2.0F : 1.0F);
+    recording.signals.insert(recording.signals.end(), rig::kTaxels, i < 5 ? 2.0F : 1.0F);
   }
   return recording;
 }
@@ -45,7 +45,7 @@ TEST(ApplyRegistration, ALossIsFilledWithALine) {
   ASSERT_EQ(r.frames(), 14u);
   const float line[] = {2, 1.8F, 1.6F, 1.4F, 1.2F, 1};
   for (std::size_t i = 4; i < 10; ++i)
-    for (const std::size_t k : {0, 15}) EXPECT_FLOAT_EQ(r.signals[i * kTaxels + k], line[i - 4]) << i;
+    for (const std::size_t k : {0, 15}) EXPECT_FLOAT_EQ(r.signals[i * rig::kTaxels + k], line[i - 4]) << i;
   for (std::size_t i = 0; i < 14; ++i) {
     EXPECT_DOUBLE_EQ(r.time_s[i], 0.25 * static_cast<double>(i));
     EXPECT_EQ(r.position_mm[2 * i], 5.5F);

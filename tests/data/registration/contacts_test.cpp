@@ -17,7 +17,7 @@ Recording dips(const std::vector<double>& centres, double depth, double floor = 
   for (int i = 0; i < 3000; ++i) {
     const double t = i / 500.0;
     recording.time_s.push_back(t);
-    for (int k = 0; k < kTaxels; ++k) {
+    for (int k = 0; k < rig::kTaxels; ++k) {
       double v = 2.44;
       for (const double c : centres)
         if (k == 6) v -= depth * std::max(0.0, 1 - std::abs(t - c) / 0.2);
@@ -48,7 +48,7 @@ TEST(Contacts, IgnoresNoiseFlatSignalsAndHoles) {
   EXPECT_TRUE(find_contacts(Recording{}).empty());
   Recording holes = dips({1.5}, 0.1);
   for (std::size_t i = 700; i < 720; ++i)
-    holes.signals[i * kTaxels + 6] = std::numeric_limits<float>::quiet_NaN();
+    holes.signals[i * rig::kTaxels + 6] = std::numeric_limits<float>::quiet_NaN();
   const auto found = find_contacts(holes);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_NEAR(found[0].time_s, 1.5, 0.005);

@@ -51,8 +51,8 @@ TEST(LostFrames, ALossIsCountedToAFrameOrAFifth) {
   double most = 0;
   for (std::size_t i = 1000; i + 1000 < whole.frames(); ++i) {
     double change = 0;
-    for (std::size_t k = 0; k < kTaxels; ++k)
-      change += std::abs(whole.signals[i * kTaxels + k] - whole.signals[(i - 1) * kTaxels + k]);
+    for (std::size_t k = 0; k < rig::kTaxels; ++k)
+      change += std::abs(whole.signals[i * rig::kTaxels + k] - whole.signals[(i - 1) * rig::kTaxels + k]);
     if (change > most) most = change, at = i;
   }
   for (const std::size_t lost : {1, 5, 20}) {
@@ -86,8 +86,8 @@ TEST(LostFrames, NothingIsFoundWhereNothingIsMissing) {
 TEST(LostFrames, DeadAndSaturatedTaxelsDoNotHideThem) {
   Recording recording = lossy_pass("6_Bumps", 4, 6);
   for (std::size_t i = 0; i < recording.frames(); ++i)
-    for (std::size_t k = 0; k < kTaxels; ++k) {
-      float& v = recording.signals[i * kTaxels + k];
+    for (std::size_t k = 0; k < rig::kTaxels; ++k) {
+      float& v = recording.signals[i * rig::kTaxels + k];
       if (k % 3 == 0) v = 2.44F;
       if (k % 3 == 1) v = std::max(v, 2.35F);
     }

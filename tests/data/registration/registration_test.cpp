@@ -39,7 +39,7 @@ void press_hard(Recording& recording, double gain) {
 }
 
 void kill_taxel(Recording& recording, std::size_t k) {
-  for (std::size_t i = 0; i < recording.frames(); ++i) recording.signals[i * kTaxels + k] = 2.44F;
+  for (std::size_t i = 0; i < recording.frames(); ++i) recording.signals[i * rig::kTaxels + k] = 2.44F;
 }
 
 // The fit takes leading and trailing rows to respond alike. A tilted finger does not: 0.01 mm/mm moves the
@@ -147,10 +147,10 @@ TEST(Registration, FlagsWhatCannotBeFitted) {
             "a plain plate has nothing to register against");
   EXPECT_EQ(register_pass(Recording{}, Plate::named("3_Bumps")).reason, "the recording is empty");
   Recording silent = pass;
-  for (std::size_t k = 0; k < kTaxels; ++k) kill_taxel(silent, k);
+  for (std::size_t k = 0; k < rig::kTaxels; ++k) kill_taxel(silent, k);
   EXPECT_EQ(register_pass(silent, Plate::named("6_Ridges")).reason, "no taxel felt anything");
   Recording brief = pass;
-  brief.time_s.resize(2000), brief.signals.resize(2000 * kTaxels);
+  brief.time_s.resize(2000), brief.signals.resize(2000 * rig::kTaxels);
   EXPECT_FALSE(register_pass(brief, Plate::named("6_Ridges")).reliable);
   const Registration wrong = register_pass(pass, Plate::named("4_Ridges"));
   EXPECT_FALSE(wrong.reliable) << wrong.matched << ' ' << wrong.coverage << ' ' << wrong.residual;

@@ -48,7 +48,7 @@ TEST(Ridge, IsLinearInTheWindow) {
   const auto train = all_of(set);
   const Ridge ridge(set, train);
   EXPECT_DOUBLE_EQ(ridge.penalty(), 1e-5) << "nothing to guard against without noise";
-  std::vector<float> a(256), b(256), middle(256), window(kSteps * kTaxels);
+  std::vector<float> a(256), b(256), middle(256), window(kSteps * rig::kTaxels);
   ridge.predict(set.window(10), a);
   ridge.predict(set.window(500), b);
   for (std::size_t i = 0; i < window.size(); ++i) window[i] = (set.window(10)[i] + set.window(500)[i]) / 2;

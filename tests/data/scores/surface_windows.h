@@ -20,8 +20,8 @@ inline WindowSet surface_windows(double base, double per_height, double noise = 
     Recording recording = make_recording({.plate = "bumps12", .pass = pass, .frames = 900, .start_y_mm = 40});
     const RandomStream random(static_cast<std::uint64_t>(pass), 0);
     for (std::size_t i = 0; i < recording.signals.size(); ++i) {
-      const double y = recording.position_mm[2 * (i / kTaxels) + 1];
-      const double row_mm = -4.5 + 3 * static_cast<double>(i % kTaxels / 4);
+      const double y = recording.position_mm[2 * (i / rig::kTaxels) + 1];
+      const double row_mm = -4.5 + 3 * static_cast<double>(i % rig::kTaxels / 4);
       const double height = plate.height(18, y + row_mm) / plate.max_height();
       recording.signals[i] =
           static_cast<float>(3 - 2 * (base + per_height * height + noise * random.normal(i)));

@@ -21,8 +21,8 @@ namespace {
 constexpr int kTimesteps = 16;
 const Scaling kWide{.rest = 3.0, .span = 2.0};
 
-std::span<const float, kTaxels> volts_of(const Recording& recording, std::size_t frame) {
-  return std::span(recording.signals).subspan(frame * kTaxels).first<kTaxels>();
+std::span<const float, rig::kTaxels> volts_of(const Recording& recording, std::size_t frame) {
+  return std::span(recording.signals).subspan(frame * rig::kTaxels).first<rig::kTaxels>();
 }
 
 LiveWindowSettings live_settings(double sensor_rate_hz) {
@@ -44,7 +44,7 @@ Recording first_frames(const Recording& whole, std::size_t frames) {
   Recording part;
   part.time_s.assign(whole.time_s.begin(), whole.time_s.begin() + static_cast<std::ptrdiff_t>(frames));
   part.signals.assign(whole.signals.begin(),
-                      whole.signals.begin() + static_cast<std::ptrdiff_t>(frames * kTaxels));
+                      whole.signals.begin() + static_cast<std::ptrdiff_t>(frames * rig::kTaxels));
   return part;
 }
 
@@ -61,7 +61,7 @@ std::size_t expect_windows_of_set(const Recording& recording, LiveWindow live, b
     return resample(first_frames(recording, frames), {.scaling = kWide});
   };
   std::size_t next = 0, complete = 0;
-  Window window(kTimesteps * kTaxels), expected(window.size());
+  Window window(kTimesteps * rig::kTaxels), expected(window.size());
   Track track = track_of(1);
   feed(live, recording, [&](std::size_t frame) {
     const bool due = track.run.back() >= kTimesteps;
@@ -69,7 +69,7 @@ std::size_t expect_windows_of_set(const Recording& recording, LiveWindow live, b
     const std::size_t sample = track.frames() - 1;
     if (due) {
       expected.assign(track.samples.end() - static_cast<std::ptrdiff_t>(window.size()), track.samples.end());
-      if (per_window) normalise_window(expected, kTaxels);
+      if (per_window) normalise_window(expected, rig::kTaxels);
       ASSERT_EQ(window, expected) << "frame " << frame;
     }
     const bool last = frame + 1 == recording.frames();
@@ -95,8 +95,8 @@ Recording rough_recording(double rate_hz, double lost, std::uint64_t seed) {
     if (random.uniform(3 * i) < lost) continue;
     const double gap = i > smooth.frames() / 2 ? 0.3 : 0;
     rough.time_s.push_back(smooth.time_s[i] + gap + 0.4 * (random.uniform(3 * i + 1) - 0.5) / rate_hz);
-    for (int k = 0; k < kTaxels; ++k)
-      rough.signals.push_back(1 + 2 * static_cast<float>(random.uniform(1000 + kTaxels * i + k)));
+    for (int k = 0; k < rig::kTaxels; ++k)
+      rough.signals.push_back(1 + 2 * static_cast<float>(random.uniform(1000 + rig::kTaxels * i + k)));
     rough.position_mm.insert(rough.position_mm.end(), {18.0F, 30.0F});
   }
   return rough;
@@ -156,7 +156,7 @@ TEST(LiveWindow, AppliesTheMovingAverageOfTraining) {
   const Recording raw = simulate_pass(plate, {.to_mm = 36}, unfiltered);
   LiveWindow with_filter({.timesteps = kTimesteps, .filter_s = filtered.filter_s});
   LiveWindow without({.timesteps = kTimesteps});
-  Window expected(kTimesteps * kTaxels), window(kTimesteps * kTaxels);
+  Window expected(kTimesteps * rig::kTaxels), window(kTimesteps * rig::kTaxels);
   for (std::size_t i = 0; i < truth.frames(); ++i) {
     with_filter.push(raw.time_s[i], volts_of(raw, i));
     without.push(truth.time_s[i], volts_of(truth, i));
@@ -171,13 +171,13 @@ TEST(LiveWindow, StartsAnewAfterAGapEvenOneLongerThanTheWindow) {
     Recording recording = make_recording({.frames = 60});
     for (std::size_t i = 30; i < 60; ++i) recording.time_s[i] += gap;
     LiveWindow live(live_settings(300));
-    Window window(kTimesteps * kTaxels);
+    Window window(kTimesteps * rig::kTaxels);
     feed(live, recording, [&](std::size_t frame) {
       const bool spans = frame < 30 ? frame >= 15 : frame >= 45;
       EXPECT_EQ(live.window(window), spans) << "frame " << frame << ", gap " << gap;
     });
     EXPECT_EQ(live.counters().gaps, 1U);
-    EXPECT_EQ(window[0], kWide(recording.signals[44 * kTaxels]));
+    EXPECT_EQ(window[0], kWide(recording.signals[44 * rig::kTaxels]));
   }
 }
 
@@ -185,7 +185,7 @@ TEST(LiveWindow, AFrameThatIsNotLaterIsLeftOutAClockSetBackStartsAnew) {
   const Recording recording = make_recording({.frames = 40});
   LiveWindow live(live_settings(300));
   feed(live, recording);
-  Window before(kTimesteps * kTaxels), after(kTimesteps * kTaxels);
+  Window before(kTimesteps * rig::kTaxels), after(kTimesteps * rig::kTaxels);
   ASSERT_TRUE(live.window(before));
   live.push(recording.time_s[39], volts_of(recording, 0));
   live.push(recording.time_s[37], volts_of(recording, 0));
@@ -200,13 +200,13 @@ TEST(LiveWindow, AFrameThatIsNotLaterIsLeftOutAClockSetBackStartsAnew) {
 TEST(LiveWindow, TakesADamagedFrameAsLost) {
   const Recording recording = make_recording({.frames = 40});
   LiveWindow live(live_settings(300));
-  std::array<float, kTaxels> damaged{};
+  std::array<float, rig::kTaxels> damaged{};
   damaged[7] = std::numeric_limits<float>::quiet_NaN();
   feed(live, recording, [&](std::size_t i) { live.push(recording.time_s[i] + 1e-3, damaged); });
   live.push(std::numeric_limits<double>::infinity(), volts_of(recording, 0));
   EXPECT_EQ(live.counters().damaged, 41U);
   EXPECT_EQ(live.counters().frames, 40U);
-  Window window(kTimesteps * kTaxels);
+  Window window(kTimesteps * rig::kTaxels);
   ASSERT_TRUE(live.window(window));
   for (const float v : window) ASSERT_TRUE(std::isfinite(v));
 }

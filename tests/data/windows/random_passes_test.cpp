@@ -123,7 +123,7 @@ float typical_level(const WindowSet& windows, std::size_t begin, std::size_t end
   std::vector<float> levels, input(windows.input_size());
   for (std::size_t pass = begin; pass < end; ++pass) {
     windows.window(windows.passes()[pass].first_window, input);
-    levels.push_back(*std::max_element(input.begin(), input.begin() + kTaxels));
+    levels.push_back(*std::max_element(input.begin(), input.begin() + rig::kTaxels));
   }
   std::ranges::sort(levels);
   return levels[levels.size() / 2];

@@ -31,8 +31,8 @@ TEST(Windows, AreTheLastFramesOfAPass) {
   set.window(3, window);
   EXPECT_EQ(set.frame_of(3), 18U);
   for (std::size_t i = 0; i < window.size(); ++i)
-    ASSERT_EQ(window[i], set.settings().scaling(recording.signals[3 * kTaxels + i]));
-  EXPECT_EQ(set.shown_frame(3), std::vector<float>(window.end() - kTaxels, window.end()));
+    ASSERT_EQ(window[i], set.settings().scaling(recording.signals[3 * rig::kTaxels + i]));
+  EXPECT_EQ(set.shown_frame(3), std::vector<float>(window.end() - rig::kTaxels, window.end()));
   EXPECT_NEAR(set.position(3).y_mm, 30 + 18 * 10.0 / 300, 1e-4);
   EXPECT_EQ(set.position(3).x_mm, 18);
 }

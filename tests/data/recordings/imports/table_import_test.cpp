@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/random.h"
 #include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 
@@ -195,7 +197,23 @@ TEST_F(TableImport, ImpossibleValuesAreNamed) {
       "column 3 as value 3 of the frame runs from 4095 to 4095, the sensor's range is 40 to 900 counts");
   expect_refusal(file(lines(30, "50,60,70,80\n", 3, "50,60,nan,80\n")), "",
                  "column 2 as value 2 of the frame is nan in line 4");
-  expect_refusal(file("a b\nc d\n"), "", "holds no line of numbers");
+  expect_refusal(file("a b\nc d\n"), "", "holds no line of numbers (too few lines)");
+  std::string frames, slip;
+  std::array<int, 8> walks;
+  walks.fill(500);
+  for (unsigned i = 0; i < 300; ++i) {
+    frames += "\xAA\x55", slip += '\xC0';
+    for (unsigned k = 0; k < 8; ++k) {
+      walks[k] += static_cast<int>(21 * RandomStream(1, k).uniform(i)) - 10;
+      const auto value = static_cast<unsigned>(walks[k]);
+      frames += static_cast<char>(value % 256), frames += static_cast<char>(value / 256);
+      const char low = static_cast<char>(value % 256);
+      slip += low == '\xC0' ? "\xDB\xDC" : low == '\xDB' ? "\xDB\xDD" : std::string(1, low);
+    }
+    slip += '\xC0';
+  }
+  expect_refusal(file(frames), "", "holds no table but binary frames; supertac-stream --sensor FILE");
+  expect_refusal(file(slip), "", "holds no line of numbers (frames in SLIP");
   for (const auto& [map, why] :
        {std::pair("time=0:h", "time is in 'h', expected s, ms, us or ns"),
         {"time=0,x=1,y=2,time=3", "names time twice"},

@@ -15,7 +15,7 @@ namespace {
 
 std::string line_of(double first) {
   std::string line;
-  for (int k = 0; k < kTaxels; ++k) line += std::to_string(first + 0.01 * k) + " ";
+  for (int k = 0; k < rig::kTaxels; ++k) line += std::to_string(first + 0.01 * k) + " ";
   return line + "\n";
 }
 
@@ -49,7 +49,7 @@ TEST(TextImport, ReadsFramesInOrder) {
   EXPECT_EQ(result.error, "");
   ASSERT_EQ(result.recording.frames(), 3u);
   EXPECT_FLOAT_EQ(result.recording.signals[0], 2.0F);
-  EXPECT_FLOAT_EQ(result.recording.signals[2 * kTaxels + 5], 2.052F);
+  EXPECT_FLOAT_EQ(result.recording.signals[2 * rig::kTaxels + 5], 2.052F);
   EXPECT_EQ(result.recording.time_s, (std::vector<double>{0, 1 / rig::kFrameRateHz, 2 / rig::kFrameRateHz}));
   EXPECT_TRUE(result.recording.position_mm.empty());
   EXPECT_EQ(result.recording.metadata.at("time_base"), "nominal");

@@ -99,10 +99,10 @@ TEST(NormaliseWindow, NanStaysWhereItIs) {
 
 TEST(NormaliseWindow, RefusesWhatIsNoWindow) {
   for (const auto& [values, taxels] :
-       {std::pair(7, 2), {7, 0}, {0, 2}, {60'001, 1}}) {  // counts would not fit
+       {std::pair(7, 2), {7, 0}, {0, 2}, {65'536, 1}}) {  // counts would not fit
     std::vector<float> x(static_cast<std::size_t>(values));
     EXPECT_EQ(what_of<std::invalid_argument>([&] { normalise_window(x, static_cast<std::size_t>(taxels)); }),
-              "normalise_window: a window is [T][" + std::to_string(taxels) + "], T up to 60000, got " +
+              "normalise_window: a window is [T][" + std::to_string(taxels) + "], T up to 65535, got " +
                   std::to_string(values) + " values");
   }
 }

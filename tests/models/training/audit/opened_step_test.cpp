@@ -189,7 +189,7 @@ TEST_F(OpenedSteps, AnotherSampleIsFoundWithItsMicroBatch) {
     const auto slot = std::ranges::find_if(examples, holds) - examples.begin();
     if (slot == std::ssize(examples)) continue;
     const WindowSet other = small_windows(small_.recipe.model, 150, [&](Recording& r) {
-      if (r.trial == static_cast<int>(pass) + 1) r.signals[frame * kTaxels] = 2.0F;
+      if (r.trial == static_cast<int>(pass) + 1) r.signals[frame * rig::kTaxels] = 2.0F;
     });
     const auto at = found([&](const Keep& keep) { return opened(other, keep); });
     ASSERT_TRUE(at);
