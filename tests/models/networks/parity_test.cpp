@@ -19,7 +19,7 @@ using test::Difference;
 using test::doubles;
 using test::stored;
 
-constexpr Dim kGroups = 4, rig::kTaxels = 16;
+constexpr Dim kGroups = 4, kTaxels = 16;
 constexpr bool kDouble = sizeof(real) == 8;
 constexpr Dim kBatch = 4, kTimesteps = 32, kLatent = 3, kSteps = 10;
 constexpr std::size_t kSampleAbove = 1024, kSampleStride = 13;
@@ -130,9 +130,7 @@ std::array<Tensor, kGroups> eps_of_step(Dim step) {
   return eps;
 }
 
-Tensor small_windows() {
-  return tensor({kBatch, kTimesteps, rig::kTaxels}, stored(reference(), "small.windows"));
-}
+Tensor small_windows() { return tensor({kBatch, kTimesteps, kTaxels}, stored(reference(), "small.windows")); }
 
 Loss loss_of(const SuperTac::Output& out) {
   const Tensor truth = tensor({kBatch, 16, 16, 1}, stored(reference(), "small.truth"));
@@ -220,10 +218,9 @@ TEST(Parity, TenStepsOfAdam) {
 TEST(Parity, SingleFrames) {
   Comparison compare;
   const Tensor windows = small_windows();
-  Tensor frames(Shape{kBatch, 1, rig::kTaxels});
+  Tensor frames(Shape{kBatch, 1, kTaxels});
   for (Dim n = 0; n < kBatch; ++n)
-    std::copy_n(windows.data() + ((n + 1) * kTimesteps - 1) * rig::kTaxels, rig::kTaxels,
-                frames.data() + n * rig::kTaxels);
+    std::copy_n(windows.data() + ((n + 1) * kTimesteps - 1) * kTaxels, kTaxels, frames.data() + n * kTaxels);
   compare.expect("small.frame.sr", doubles(make_model(1, kLatent).infer(frames)));
 }
 
@@ -236,10 +233,10 @@ TEST(Parity, VerticalGrouping) {
 TEST(Parity, FullSizeOutputs) {
   Comparison compare;
   constexpr Dim kImages = 2, kT = 256, kLd = 10;
-  std::vector<double> windows = counter_numbers("full.windows", kImages * kT * rig::kTaxels);
+  std::vector<double> windows = counter_numbers("full.windows", kImages * kT * kTaxels);
   for (double& x : windows) x = (x + 1) / 2;
   const SuperTac model = make_model(kT, kLd);
-  const Tensor input = tensor({kImages, kT, rig::kTaxels}, windows);
+  const Tensor input = tensor({kImages, kT, kTaxels}, windows);
   std::array<Tensor, kGroups> eps;
   for (Tensor& t : eps) t = Tensor::zeros({kImages, kLd});
   expect_outputs(compare, "full", model.forward(input, eps));
