@@ -107,14 +107,14 @@ GradientReport check_gradients(const Function& f, std::vector<Variable> inputs,
       const Dim index = i * size / count;
       const double analytic = grad.defined() ? static_cast<double>(grad.data()[index]) / kTimes : 0;
       const double numeric = nearest_derivative(f, inputs[k], index, options.step, analytic);
-      report.all.push_back({k, index, analytic, numeric, 0, {}});
+      report.worst.push_back({k, index, analytic, numeric, 0, {}});
       largest[k] = std::max(largest[k], std::abs(numeric));
     }
   }
-  report.entries = static_cast<Dim>(report.all.size());
-  if (report.all.empty()) return report;
+  report.entries = static_cast<Dim>(report.worst.size());
+  if (report.worst.empty()) return report;
   const double largest_of_all = *std::max_element(largest.begin(), largest.end());
-  for (GradientEntry& e : report.all) {
+  for (GradientEntry& e : report.worst) {
     const double scale =
         std::max(std::abs(e.analytic), std::abs(e.numeric)) + 1e-3 * largest[e.input] + 1e-5 * largest_of_all;
     e.relative_error = std::abs(e.analytic - e.numeric) / std::max(scale, 1e-10);
@@ -122,20 +122,12 @@ GradientReport check_gradients(const Function& f, std::vector<Variable> inputs,
     report.wrong += e.relative_error > kGradientTolerance;
     e.place = place_of(e, inputs[e.input].shape(), options.names);
   }
-  report.worst = report.all;
   std::sort(report.worst.begin(), report.worst.end(), [](const GradientEntry& a, const GradientEntry& b) {
     return a.relative_error > b.relative_error;
   });
   report.max_relative_error = report.worst.front().relative_error;
   if (report.worst.size() > 10) report.worst.resize(10);
   return report;
-}
-
-GradientReport check_gradients(const std::function<Variable(const std::vector<Variable>&)>& f,
-                               const std::vector<Tensor>& inputs, const GradientCheckOptions& options) {
-  std::vector<Variable> leaves;
-  for (const Tensor& t : inputs) leaves.emplace_back(t.clone(), true);
-  return check_gradients([&] { return f(leaves); }, leaves, options);
 }
 
 }  // namespace supertac

@@ -30,8 +30,7 @@ struct GradientReport {
   std::vector<GradientEntry> worst;  // the largest errors first, at most ten
   double max_relative_error = 0;
   Dim entries = 0;
-  std::vector<GradientEntry> all = {};  // by input and index
-  Dim wrong = 0;                        // entries beyond kGradientTolerance
+  Dim wrong = 0;  // entries beyond kGradientTolerance
   /// How many are wrong, and one line per entry of `worst`, for a failing test to print:
   /// "1 of 72 entries off by more than 1e-06"
   /// "encoder.2.conv.1.weight [3,0,7] of [4,2,9]: analytic 0.25, numeric 0.5, relative error 0.5"
@@ -53,9 +52,5 @@ struct GradientCheckOptions {
 /// the second added. What f throws comes through, with the leaves put back.
 GradientReport check_gradients(const std::function<Variable()>& f, std::vector<Variable> leaves,
                                const GradientCheckOptions& options = {});
-
-/// The same for a function of inputs; its leaves are copies, and `inputs` stay as they are.
-GradientReport check_gradients(const std::function<Variable(const std::vector<Variable>&)>& f,
-                               const std::vector<Tensor>& inputs, const GradientCheckOptions& options = {});
 
 }  // namespace supertac

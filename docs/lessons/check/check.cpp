@@ -3,90 +3,65 @@
 #include ENGINE
 
 #include <cstdio>
-#include <memory>
+#include <functional>
 
 #include "docs/lessons/check/checker.h"
 
 namespace {
 
-using lessons::Compared;
-using lessons::numbers;
-using lessons::Report;
-using Leaves = std::vector<supertac::Variable>;
-using supertac::Variable;
+using lessons::Compared, lessons::numbers, lessons::Report, lessons::slope;
 
 // A term's slopes at seven places beside differences of its value.
 [[maybe_unused]] void check_term(Report& report, const std::string& name, Term (*term)(In), int inputs,
                                  double low = -2, double high = 2) {
-  std::vector<Compared> slopes;
-  for (int k = 0; k < inputs; ++k)
-    slopes.push_back({"the slope by a[" + std::to_string(k) + "]", {7}, {}, {}});
-  for (int i = 0; i < 7; ++i) {
-    double a[5] = {0.7, 0.7, 0.7, 0.7, 0.7};
-    for (int k = 0; k < inputs; ++k) a[k] = numbers({7}, low + 0.1 * k, high - 0.07 * k).data()[i];
-    for (std::size_t k = 0; k < slopes.size(); ++k) {
-      const double at = a[k], h = 1e-5;
-      slopes[k].yours.push_back(term(a)[k + 1]);
-      a[k] = at + h;
-      const double above = term(a)[0];
-      a[k] = at - h;
-      slopes[k].right.push_back((above - term(a)[0]) / (2 * h));
-      a[k] = at;
+  for (int by = 0; by < inputs; ++by) {
+    Compared slopes{"the slope by a[" + std::to_string(by) + "]", {7}};
+    for (std::size_t i = 0; i < 7; ++i) {
+      double a[5] = {0.7, 0.7, 0.7, 0.7, 0.7};
+      for (int k = 0; k < inputs; ++k) a[k] = numbers(7, low + 0.1 * k, high - 0.07 * k)[i];
+      slopes.yours.push_back(term(a)[by + 1]);
+      slopes.right.push_back(slope(a[by], [&] { return term(a)[0]; }));
     }
+    report.add(name, slopes, "differences give");
   }
-  report.gradients(name, slopes);
 }
 
 #if LESSON >= 3 && LESSON <= 8
-using Op = std::function<Tensor(const std::vector<Tensor>&)>;
-struct Yours {
-  Op op;
-  std::vector<Shape> shapes;  // of its inputs
-
-  template <class ValueOf>
-  Tensor run(std::vector<Tensor>& xs, ValueOf value_of) const {
-    tape.clear();
-    for (std::size_t k = 0; k < shapes.size(); ++k) {
-      const supertac::Tensor& t = value_of(k);
-      xs.push_back(tensor(shapes[k], Array(t.data(), t.data() + t.size())));
-    }
-    return op(xs);
-  }
-};
-
-// The student's op as one of the project's. Gradients begin with what is there already, so that one that is
-// set where it should be added is seen.
-Variable through(const std::shared_ptr<const Yours>& yours, const Leaves& in) {
-  std::vector<const Variable*> pointers;
-  for (const Variable& x : in) pointers.push_back(&x);
-  std::vector<Tensor> inputs;
-  const Tensor y = yours->run(inputs, [&](std::size_t k) { return in[k].value(); });
-  return supertac::record("yours", supertac::Tensor::of({y->size()}, y->value), pointers,
-                          [yours](supertac::Backward& b) {
-                            std::vector<Tensor> xs;
-                            const Tensor result = yours->run(xs, [&](std::size_t k) { return b.value(k); });
-                            std::copy_n(b.gy().data(), b.gy().size(), result->grad.begin());
-                            for (std::size_t k = 0; k < xs.size(); ++k)
-                              std::copy_n(b.grad_of(k)->data(), xs[k]->size(), xs[k]->grad.begin());
-                            for (auto step = tape.rbegin(); step != tape.rend(); ++step) (*step)();
-                            tape.clear();
-                            for (std::size_t k = 0; k < xs.size(); ++k)
-                              std::copy_n(xs[k]->grad.begin(), xs[k]->size(), b.grad_of(k)->data());
-                          });
-}
-
-void check_op(Report& report, const std::string& what, const std::vector<std::string>& names,
-              const std::vector<Shape>& shapes, const Op& op, double low = -1) {
-  std::vector<supertac::Tensor> inputs;
-  for (const Shape& s : shapes)
-    inputs.push_back(numbers({s.c, s.h, s.w}, low + 0.03 * double(inputs.size())));
-  const auto yours = std::make_shared<const Yours>(Yours{op, shapes});
-  report.gradients(what, names, inputs, [=](const Leaves& in) { return through(yours, in); });
-}
-
 [[maybe_unused]] Tensor made(const Shape& s, double low = -1) {
-  const supertac::Tensor t = numbers({s.c, s.h, s.w}, low);
-  return tensor(s, Array(t.data(), t.data() + t.size()));
+  return tensor(s, numbers(std::size_t(s.size()), low));
+}
+
+// The gradients of an op's inputs beside differences; the loss is a sum of y with irregular weights.
+void check_op(Report& report, const std::string& what, const std::vector<std::string>& names,
+              const std::vector<Shape>& shapes, const std::function<Tensor(const std::vector<Tensor>&)>& op,
+              double low = -1) {
+  std::vector<Tensor> xs;
+  for (const Shape& s : shapes) xs.push_back(made(s, low + 0.03 * double(xs.size())));
+  const auto weight = [](std::size_t i) {
+    return (0.5 + std::fmod(0.61803398875 * double(i + 1), 1.0)) * (i % 3 == 1 ? -1 : 1);
+  };
+  const auto loss = [&] {
+    tape.clear();
+    const Tensor y = op(xs);
+    double sum = 0;
+    for (std::size_t i = 0; i < y->value.size(); ++i) sum += weight(i) * y->value[i];
+    return sum;
+  };
+  for (int time = 0; time < 2; ++time) {  // twice: what is set where it should be added is half in the end
+    tape.clear();
+    const Tensor y = op(xs);
+    for (std::size_t i = 0; i < y->grad.size(); ++i) y->grad[i] = weight(i);
+    for (auto step = tape.rbegin(); step != tape.rend(); ++step) (*step)();
+  }
+  for (std::size_t k = 0; k < xs.size(); ++k) {
+    Compared gradient{"the gradient of " + names[k], {xs[k]->c, xs[k]->h, xs[k]->w}};
+    for (std::size_t i = 0; i < xs[k]->value.size(); ++i) {
+      gradient.yours.push_back(xs[k]->grad[i] / 2);
+      gradient.right.push_back(slope(xs[k]->value[i], loss));
+    }
+    report.add(what, gradient, "differences give");
+  }
+  tape.clear();
 }
 #endif
 

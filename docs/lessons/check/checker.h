@@ -1,12 +1,10 @@
-// What the lessons are checked with: the project's gradient checker, and sentences about what it finds.
+// What the lessons are checked with: differences, and sentences about what they find.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
-
-#include "autograd/gradient_checker.h"
-#include "autograd/record.h"
 
 namespace lessons {
 
@@ -14,7 +12,7 @@ namespace lessons {
 struct Compared {
   std::string name;        ///< "gw"
   std::vector<int> shape;  ///< row-major
-  std::vector<double> yours, right;
+  std::vector<double> yours = {}, right = {};
 };
 
 /// "gw [1,0]: yours 2, differences give 4 (22 of 22 entries are wrong, by the factor 0.5)": the worst entry,
@@ -26,12 +24,6 @@ class Report {
  public:
   void add(const std::string& what, const Compared& array, const std::string& from = "it should be");
   void add(const std::string& what, double yours, double right) { add(what, {what, {1}, {yours}, {right}}); }
-  /// Gradients by the project's checker. `names` and `shapes` are the inputs'.
-  void gradients(const std::string& what, const std::vector<std::string>& names,
-                 const std::vector<supertac::Tensor>& inputs,
-                 const std::function<supertac::Variable(const std::vector<supertac::Variable>&)>& f);
-  /// The same of gradients that are known.
-  void gradients(const std::string& what, const std::vector<Compared>& arrays);
   int wrong() const { return wrong_; }
 
  private:
@@ -39,7 +31,10 @@ class Report {
 };
 
 /// Irregular numbers between low and high, none of them near 0.
-supertac::Tensor numbers(const supertac::Shape& shape, double low = -1, double high = 1);
+std::vector<double> numbers(std::size_t count, double low = -1, double high = 1);
+
+/// df / dx, x being a number that f reads: (8 (f(+h) - f(-h)) - (f(+2h) - f(-2h))) / 12 h.
+double slope(double& x, const std::function<double()>& f);
 
 /// Names the lesson and ends with 1 where the program would abort: -D_GLIBCXX_ASSERTIONS sees indices
 /// outside.

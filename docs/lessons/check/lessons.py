@@ -77,7 +77,7 @@ int main(int, char** arguments) {{
 """
     stem = pathlib.Path(folder) / f"lesson{n}"
     stem.with_suffix(".cpp").write_text(out)
-    subprocess.run([compiler, "-std=c++20", "-O0", "-w", "-D_GLIBCXX_ASSERTIONS", "-DSUPERTAC_REAL_IS_DOUBLE",
+    subprocess.run([compiler, "-std=c++20", "-O0", "-w", "-D_GLIBCXX_ASSERTIONS",
                     f"-DLESSON={n}", f"-I{ROOT}", f"{stem}.cpp", archive, "-o", stem], check=True)
     return stem
 
