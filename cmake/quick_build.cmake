@@ -1,5 +1,6 @@
 # -DSUPERTAC_QUICK_BUILD=ON, as scripts/demo.sh and scripts/test.sh have it: headers of the standard library, JSON and
-# GoogleTest are parsed once for all files. Off by default, since a file that forgets an #include would compile with it.
+# GoogleTest are parsed once for all files, and up to eight files of a library or a program are compiled as one. Off by
+# default, since a file that forgets an #include would compile with it, and whoever changes one file compiles eight.
 if(NOT SUPERTAC_QUICK_BUILD)
   return()
 endif()
@@ -18,6 +19,10 @@ file(WRITE ${PROJECT_BINARY_DIR}/precompiled.cpp "int main() {}\n")
 file(GLOB_RECURSE own_flags ${PROJECT_SOURCE_DIR}/autograd/kernels/fast/*.cpp)
 set_source_files_properties(${own_flags} TARGET_DIRECTORY supertac_autograd supertac_autograd_f64
   PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+
+# Has types of the anonymous namespace in a class of a header.
+set_source_files_properties(${PROJECT_SOURCE_DIR}/models/inference/compiled/integer_plan.cpp TARGET_DIRECTORY supertac_compiled
+  PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 
 # A library (-fPIC) and a program (-fPIE) cannot share a header, nor can files with OpenMP and without, nor examples, which
 # have none of our options.
@@ -54,6 +59,9 @@ function(supertac_precompile target)
   target_compile_options(${target} PRIVATE ${OpenMP_CXX_FLAGS}
     "$<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow;-Wno-stringop-overread;-Wno-array-bounds>")
   target_precompile_headers(${target} REUSE_FROM ${header})
+  if(NOT kind MATCHES "test")
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+  endif()
 endfunction()
 
 function(supertac_precompile_folder folder)

@@ -14,7 +14,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 QUICK = ["-DSUPERTAC_QUICK_BUILD=ON"]
 BUILDS = {"demo": ("what the demo needs", [*QUICK, "-DSUPERTAC_TESTS=OFF"],
-                   ["--target", "supertac-simulate", "supertac-train", "supertac-evaluate", "supertac-info"]),
+                   ["--target", "supertac-simulate", "supertac-train", "supertac-evaluate"]),
           "all": ("everything, with tests", [*QUICK, "-DSUPERTAC_TESTS=ON"], [])}
 # Runs a compiler and notes the most memory that it held, in kB.
 LAUNCHER = """#!/usr/bin/env python3

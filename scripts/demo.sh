@@ -24,7 +24,7 @@ first_picture() { # a network in one file learns beside the build, and draws wha
 first_picture &
 first=$!
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DSUPERTAC_QUICK_BUILD=ON -DSUPERTAC_TESTS=OFF >/dev/null
-cmake --build build --target supertac-simulate supertac-train supertac-evaluate supertac-info
+cmake --build build --target supertac-simulate supertac-train supertac-evaluate
 wait $first
 bin=build/bin
 simulate() { "$bin/supertac-simulate" --speeds 10 --force --quiet "$@"; }
@@ -49,7 +49,7 @@ score "the plain plate on trial 2" plain recordings --plates plain
 echo "pictures: $out/pictures/strips.png and a film of each pass beside it; scores: $out/*.json;"
 echo "training curves: $out/model.run/report.html"
 # The same content on every processor: README says which.
-hash=$("$bin/supertac-info" "$out/model.safetensors" | sed -n 's/^content *//p' | cut -c1-16)
+hash=$(sed -n 's/.*"content": "\([^"]*\)".*/\1/p' "$out/model.run/settings.json" | cut -c1-16)
 known=$(sed -n 's/.*the hash of its model, `\([^`]*\)`.*/\1/p' README.md)
 if [ "$hash" = "$known" ]; then
   echo "the model's hash is $hash, as README says"
