@@ -18,8 +18,7 @@ Tensor* Backward::grad_of(std::size_t input) {
 
 static void check_gradient(const Node& x) {
   if (x.grad.shape() == x.value.shape()) return;
-  throw std::invalid_argument("backward: the gradient of " + x.value.shape().text() +
-                              " expects that shape, got " + x.grad.shape().text());
+  refuse("backward", std::string("the gradient of ") + x.op, x.value.shape().text(), x.grad.shape().text());
 }
 
 Backward::Slot Backward::slot_of(std::size_t input) {
@@ -44,18 +43,18 @@ ReverseWatch::~ReverseWatch() { reverse_watch = nullptr; }
 
 namespace {
 
+void check_not_freed(const Node& node) {
+  if (node.freed)
+    refuse("backward", node.op, "its graph",
+           "one that an earlier backward freed; run the forward pass again");
+}
+
 void check_loss(const Variable& loss) {
-  if (loss.size() != 1) {
-    throw std::invalid_argument("backward: the loss must be a scalar, shape is " + loss.shape().text());
-  }
-  if (loss.node()->freed) {
-    throw std::invalid_argument(
-        "backward: the graph of this loss was freed by an earlier backward; run the forward pass again");
-  }
-  if (!loss.requires_grad()) {
-    throw std::invalid_argument(
-        "backward: the loss does not depend on any variable that requires a gradient");
-  }
+  if (loss.size() != 1) refuse("backward", "loss", "one element", loss.shape().text());
+  check_not_freed(*loss.node());
+  if (!loss.requires_grad())
+    refuse("backward", "loss", "to depend on a variable that requires a gradient",
+           "one that depends on none");
 }
 
 // The nodes that a gradient has reached, each once; the last one made comes first.
@@ -91,11 +90,7 @@ class Queue {
 
 // Runs one node's reverse step and queues the inputs it has reached.
 void visit(Node& node, Queue& queue) {
-  if (node.freed) {
-    throw std::invalid_argument(
-        std::string("backward: ") + node.op +
-        " belongs to a graph that an earlier backward freed; run the forward pass again");
-  }
+  check_not_freed(node);
   Backward b(node);
   if (reverse_watch != nullptr) {
     reverse_watch->reverse(b, [&] { node.step(b); });

@@ -67,15 +67,15 @@ Variable record(const char* op, Tensor y, std::initializer_list<const Variable*>
                 settings);
 }
 
-// The one wording for rejected arguments: op, argument, expected, got.
-/// Each throws std::invalid_argument, e.g. "conv2d: x expects rank 4, got [2,3]"; the others check_defined(),
-/// too.
+/// Throws std::invalid_argument "op: argument expects EXPECTED, got GOT", as every op refuses an argument:
+/// "conv2d: x expects rank 4, got [2,3]". The checks below do so; those of shapes check_defined(), too.
+[[noreturn]] void refuse(const std::string& op, const std::string& argument, const std::string& expected,
+                         const std::string& got);
 void check_defined(const char* op, const char* argument, const Variable& x);
 void check_rank(const char* op, const char* argument, const Variable& x, int rank);
 void check_shape(const char* op, const char* argument, const Variable& x, const Shape& expected);
 void check_same_shape(const char* op, const char* a_name, const Variable& a, const char* b_name,
                       const Variable& b);
-/// "op: message"
-[[noreturn]] void refuse(const char* op, const std::string& message);
+void check_at_least(const char* op, const char* argument, Dim value, Dim least);
 
 }  // namespace supertac

@@ -1,13 +1,10 @@
-// Variables, their nodes, the trace of the ops that made them, and how ops refuse arguments.
+// Variables and their nodes.
 #include "autograd/variable.h"
 
-#include <algorithm>
 #include <stdexcept>
-#include <string>
 #include <utility>
 
 #include "autograd/kernels/fast/pool.h"
-#include "autograd/trace.h"
 
 namespace supertac {
 
@@ -64,9 +61,6 @@ void release(Node* node) noexcept {
 
 using detail::Node;
 
-static thread_local bool recording = true;
-static thread_local std::uint64_t last_number = 0;
-
 Variable::Variable(Tensor value, bool requires_grad) {
   if (!value.defined()) throw std::invalid_argument("Variable: the tensor is undefined");
   node_ = detail::new_node();
@@ -84,30 +78,6 @@ void Variable::drop_grad() {
   if (node.grad.defined()) node.spare = std::move(node.grad);
 }
 
-std::pair<Variable, detail::ReverseStep*> make_result(const char* op, Tensor y,
-                                                      std::span<const Variable* const> inputs,
-                                                      const OpSettings* settings) {
-  Variable result(std::move(y));
-  Node& node = *result.node();
-  node.op = op;
-  Trace::note(op, result, inputs, settings);
-  const bool needed = recording && std::any_of(inputs.begin(), inputs.end(),
-                                               [](const Variable* x) { return x->requires_grad(); });
-  if (!needed) return {std::move(result), nullptr};
-  if (inputs.size() > kMaxInputs) {
-    throw std::invalid_argument(std::string(op) + ": at most " + std::to_string(kMaxInputs) +
-                                " inputs, got " + std::to_string(inputs.size()));
-  }
-  node.requires_grad = true;
-  for (const Variable* x : inputs) {
-    last_number = std::max(last_number, x->node()->number);  // one of a thread that has counted further
-    detail::retain(x->node());
-    node.inputs[node.input_count++] = x->node();
-  }
-  node.number = ++last_number;
-  return {std::move(result), &node.step};
-}
-
 std::vector<Variable> inputs_of(const Variable& y) {
   const Node& node = y.checked();
   std::vector<Variable> inputs(node.input_count);
@@ -116,55 +86,6 @@ std::vector<Variable> inputs_of(const Variable& y) {
     detail::retain(inputs[i].node_);
   }
   return inputs;
-}
-
-static thread_local Trace* current = nullptr;
-
-Trace::Trace() {
-  if (current != nullptr) throw std::logic_error("Trace: this thread is traced already");
-  current = this;
-}
-
-Trace::~Trace() { current = nullptr; }
-
-void Trace::note(const char* op, const Variable& y, std::span<const Variable* const> inputs,
-                 const OpSettings* settings) {
-  if (current == nullptr) return;
-  TracedOp& traced =
-      current->ops_.emplace_back(TracedOp{op, y, {}, settings != nullptr ? *settings : OpSettings{}});
-  for (const Variable* x : inputs) traced.inputs.push_back(*x);
-}
-
-NoGrad::NoGrad() : before_(std::exchange(recording, false)) {}
-NoGrad::~NoGrad() { recording = before_; }
-
-void refuse(const char* op, const std::string& message) {
-  throw std::invalid_argument(std::string(op) + ": " + message);
-}
-
-void check_defined(const char* op, const char* argument, const Variable& x) {
-  if (!x.defined()) refuse(op, std::string(argument) + " expects a value, got an empty Variable");
-}
-
-void check_rank(const char* op, const char* argument, const Variable& x, int rank) {
-  check_defined(op, argument, x);
-  if (x.rank() == rank) return;
-  refuse(op, std::string(argument) + " expects rank " + std::to_string(rank) + ", got " + x.shape().text());
-}
-
-void check_shape(const char* op, const char* argument, const Variable& x, const Shape& expected) {
-  check_defined(op, argument, x);
-  if (x.shape() == expected) return;
-  refuse(op, std::string(argument) + " expects " + expected.text() + ", got " + x.shape().text());
-}
-
-void check_same_shape(const char* op, const char* a_name, const Variable& a, const char* b_name,
-                      const Variable& b) {
-  check_defined(op, a_name, a);
-  check_defined(op, b_name, b);
-  if (a.shape() == b.shape()) return;
-  refuse(op, std::string(a_name) + " and " + b_name + " must have the same shape, got " + a.shape().text() +
-                 " and " + b.shape().text());
 }
 
 }  // namespace supertac

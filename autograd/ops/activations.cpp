@@ -16,16 +16,16 @@ static Variable rectify(const char* op, const Variable& x, real slope) {
 
 Variable relu(const Variable& x) { return rectify("relu", x, 0); }
 
-Variable leaky_relu(const Variable& x, real slope) {
-  check_slope("leaky_relu", slope);
-  return rectify("leaky_relu", x, slope);
+Variable leaky_relu(const Variable& x, real negative_slope) {
+  check_slope("leaky_relu", negative_slope);
+  return rectify("leaky_relu", x, negative_slope);
 }
 
 void check_slope(const char* op, real slope) {
-  if (!(slope >= 0)) refuse(op, "slope must not be negative, got " + std::to_string(slope));
+  if (!(slope >= 0)) refuse(op, "negative_slope", "0 or more", std::to_string(slope));
 }
 
-// gy becomes the gradient before y = f(s), gs = y > 0 ? gy : slope gy.
+// y = f(s) and gy of one shape;  gy becomes gs = y > 0 ? gy : slope gy
 const real* before_activation(Backward& g, real slope) {
   const real* y = g.y().data();
   real* gs = g.mutable_gy().data();
@@ -42,8 +42,7 @@ Variable sigmoid(const Variable& x) {
 
 // y = min(max(x, low), high);  gx = gy within the limits, which belong to it, 0 beyond
 Variable clamp(const Variable& x, real low, real high) {
-  if (!(low <= high))
-    refuse("clamp", "low must not exceed high, got " + std::to_string(low) + " and " + std::to_string(high));
+  if (!(low <= high)) refuse("clamp", "low", "at most high, " + std::to_string(high), std::to_string(low));
   return elementwise(
       "clamp", x, [=](real at) { return at < low ? low : (at > high ? high : at); },
       [=](real gy, real at, real) { return at >= low && at <= high ? gy : 0; }, {.low = low, .high = high});

@@ -41,7 +41,7 @@ Maps maps_of(const char* op, const Variable& x) {
 // x [N,H,W,C], y [N,C] = mean over h, w;  gx[n,h,w,c] = gy[n,c] / (H W)
 Variable global_mean(const Variable& x) {
   const Maps maps = maps_of("global_mean", x);
-  if (maps.pixels == 0) refuse("global_mean", "x expects a pixel or more, got " + x.shape().text());
+  if (maps.pixels == 0) refuse("global_mean", "x", "a pixel or more", x.shape().text());
   const auto pixels = static_cast<real>(maps.pixels);
   Tensor y = Tensor::zeros({maps.images, maps.channels});
   real* const mean = y.data();

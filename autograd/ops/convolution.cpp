@@ -1,8 +1,7 @@
 #include "autograd/ops/convolution.h"
 
 #include "autograd/kernels/conv.h"
-#include "autograd/record.h"
-#include "autograd/trace.h"
+#include "autograd/ops/elementwise.h"
 
 namespace supertac {
 namespace {
@@ -10,29 +9,20 @@ namespace {
 using kernels::ConvSettings;
 using kernels::ConvSizes;
 
-std::string shapes(const Variable& x, const Variable& w) {
-  return " (x " + x.shape().text() + ", w " + w.shape().text() + ")";
-}
-
 void check_arguments(const char* op, const Variable& x, const Variable& w, const Variable& b,
                      const ConvOptions& o, int rank) {
   check_rank(op, "x", x, rank);
   check_rank(op, "w", w, rank);
   const Dim in = w.dim(rank - 2), out = w.dim(rank - 1);
-  if (x.dim(rank - 1) != in) {
-    refuse(op, "w expects " + std::to_string(in) + " input channels, x has " +
-                   std::to_string(x.dim(rank - 1)) + shapes(x, w));
-  }
-  if (in < 1 || in > kernels::kMaxChannels || out < 1 || out > kernels::kMaxChannels) {
-    refuse(op, "channels must be 1 to " + std::to_string(kernels::kMaxChannels) + shapes(x, w));
-  }
-  if (w.dim(0) < 1 || w.dim(rank - 3) < 1) refuse(op, "the kernel must be at least 1 wide" + shapes(x, w));
+  if (x.dim(rank - 1) != in)
+    refuse(op, "x", std::to_string(in) + " channels, as w " + w.shape().text(), x.shape().text());
+  if (in < 1 || in > kernels::kMaxChannels || out < 1 || out > kernels::kMaxChannels)
+    refuse(op, "w", "1 to " + std::to_string(kernels::kMaxChannels) + " channels", w.shape().text());
+  if (w.dim(0) < 1 || w.dim(rank - 3) < 1) refuse(op, "w", "a kernel of 1 or more", w.shape().text());
   check_shape(op, "b", b, {out});
   check_slope(op, o.negative_slope);
-  if (o.stride < 1 || o.padding < 0) {
-    refuse(op, "stride must be positive and padding not negative, got " + std::to_string(o.stride) + " and " +
-                   std::to_string(o.padding));
-  }
+  check_at_least(op, "stride", o.stride, 1);
+  check_at_least(op, "padding", o.padding, 0);
 }
 
 ConvSettings settings_of(const Variable& x, const Variable& w, const ConvOptions& o, bool transposed) {
@@ -57,14 +47,14 @@ Variable convolve(const char* op, const Variable& x, const Variable& w, const Va
                   const ConvOptions& o, int rank, bool transposed) {
   check_arguments(op, x, w, b, o, rank);
   const ConvSettings s = settings_of(x, w, o, transposed);
-  const Dim too_short_h = s.height + 2 * s.padding_h - s.kernel_h,
-            too_short_w = s.width + 2 * s.padding_w - s.kernel_w;
-  const bool empty =
-      transposed ? s.out_height() < 1 || s.out_width() < 1 : too_short_h < 0 || too_short_w < 0;
-  if (empty || s.height < 1 || s.width < 1) {
-    refuse(op, "the output would be empty (x " + x.shape().text() + ", w " + w.shape().text() + ", stride " +
-                   std::to_string(o.stride) + ", padding " + std::to_string(o.padding) + ")");
-  }
+  // How far the kernel can move in x, in pixels: a division by the stride would round -1 to an output of one.
+  const Dim room_h = s.height + 2 * s.padding_h - s.kernel_h, room_w = s.width + 2 * s.padding_w - s.kernel_w;
+  const bool empty = transposed ? s.out_height() < 1 || s.out_width() < 1 : room_h < 0 || room_w < 0;
+  if (empty || s.height < 1 || s.width < 1)
+    refuse(op, "x",
+           "pixels for an output of 1 or more with w " + w.shape().text() + ", stride " +
+               std::to_string(o.stride) + " and padding " + std::to_string(o.padding),
+           x.shape().text());
   const ConvSizes sizes{s, x.dim(0), w.dim(rank - 2), w.dim(rank - 1)};
   Tensor y(rank == 3 ? Shape{x.dim(0), s.out_width(), sizes.cout}
                      : Shape{x.dim(0), s.out_height(), s.out_width(), sizes.cout});

@@ -25,6 +25,12 @@ void add_to_gradient(Backward& g, std::size_t input, Term term) {
   }
 }
 
+/// For the ops that end in f (ops/activations.h): refuses a negative slope.
+void check_slope(const char* op, real negative_slope);
+/// For their reverse steps: replaces g's dL/dy by dL/ds = dL/dy f'(s), f' taken from the sign of y, and
+/// returns it.
+const real* before_activation(Backward& g, real negative_slope);
+
 /// y[i] = value(x[i]);   gx[i] += gradient(gy[i], x[i], y[i])
 /// `gradient` is copied into the node. Both call nothing that the C library rounds (kernels/exp.h), and
 /// capture numbers alone: a captured tensor would be kept for as long as the graph.

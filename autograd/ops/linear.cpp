@@ -5,8 +5,7 @@
 
 #include "autograd/kernels/fast/conv.h"
 #include "autograd/kernels/fast/isa/isa.h"
-#include "autograd/record.h"
-#include "autograd/trace.h"
+#include "autograd/ops/elementwise.h"
 
 namespace supertac {
 
@@ -16,10 +15,8 @@ Variable linear(const Variable& x, const Variable& w, const Variable& b, real ne
   check_rank("linear", "x", x, 2);
   check_rank("linear", "w", w, 2);
   const Dim rows = x.dim(0), in = w.dim(0), out = w.dim(1);
-  if (x.dim(1) != in) {
-    refuse("linear", "w expects " + std::to_string(in) + " inputs, x has " + std::to_string(x.dim(1)) +
-                         " (x " + x.shape().text() + ", w " + w.shape().text() + ")");
-  }
+  if (x.dim(1) != in)
+    refuse("linear", "x", std::to_string(in) + " columns, as w " + w.shape().text(), x.shape().text());
   check_shape("linear", "b", b, {out});
   check_slope("linear", negative_slope);
   Tensor y(Shape{rows, out});

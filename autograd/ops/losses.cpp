@@ -13,7 +13,7 @@ namespace supertac {
 Variable l2_loss(const Variable& x, const Variable& target) {
   check_same_shape("l2_loss", "x", x, "target", target);
   const Dim n = x.size();
-  if (n == 0) refuse("l2_loss", "x expects an element or more, got " + x.shape().text());
+  if (n == 0) refuse("l2_loss", "x", "an element or more", x.shape().text());
   const double total = kernels::sum_of(n, [from = x.value().data(), to = target.value().data()](Dim i) {
     const double d = static_cast<double>(from[i]) - static_cast<double>(to[i]);
     return d * d;
@@ -44,20 +44,17 @@ static double cross_entropy(Dim classes, const real* logits, Dim label, real* re
 Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int32_t> labels) {
   check_rank("softmax_cross_entropy", "logits", logits, 2);
   const Dim rows = logits.dim(0), classes = logits.dim(1);
-  if (rows == 0)
-    refuse("softmax_cross_entropy", "logits expects a row or more, got " + logits.shape().text());
-  if (static_cast<Dim>(labels.size()) != rows) {
-    refuse("softmax_cross_entropy",
-           "labels expects " + std::to_string(rows) + " entries, got " + std::to_string(labels.size()));
-  }
+  if (rows == 0) refuse("softmax_cross_entropy", "logits", "a row or more", logits.shape().text());
+  if (static_cast<Dim>(labels.size()) != rows)
+    refuse("softmax_cross_entropy", "labels", std::to_string(rows) + " entries",
+           std::to_string(labels.size()));
   Tensor gradient(logits.shape());  // softmax - one-hot, kept for the reverse step
   double total = 0;
   for (Dim n = 0; n < rows; ++n) {
     const Dim label = labels[static_cast<std::size_t>(n)];
-    if (label < 0 || label >= classes) {
-      refuse("softmax_cross_entropy", "label " + std::to_string(label) + " of row " + std::to_string(n) +
-                                          " is not in [0," + std::to_string(classes) + ")");
-    }
+    if (label < 0 || label >= classes)
+      refuse("softmax_cross_entropy", "labels[" + std::to_string(n) + "]",
+             "a class in [0," + std::to_string(classes) + ")", std::to_string(label));
     total +=
         cross_entropy(classes, logits.value().data() + n * classes, label, gradient.data() + n * classes);
   }

@@ -10,6 +10,15 @@
 namespace supertac {
 namespace {
 
+void check_has_columns(const char* op, const char* argument, const Variable& x) {
+  check_defined(op, argument, x);
+  if (x.rank() < 1) refuse(op, argument, "rank 1 or more", "[]");
+}
+
+void check_no_gradient(const char* op, const char* argument, const Variable& x) {
+  if (x.requires_grad()) refuse(op, argument, "a constant", "a variable that requires a gradient");
+}
+
 Shape with_last(const Shape& shape, Dim last) {
   std::array<Dim, kMaxRank> dims{};
   for (int i = 0; i < shape.rank(); ++i) dims[static_cast<std::size_t>(i)] = shape[i];
@@ -48,6 +57,7 @@ void transpose(Dim images, Dim rows, Dim columns, const real* from, Into into, r
   }
 }
 
+// x holding [images, rows, columns], y of `shape` holding [images, columns, rows];  gx is gy the other way
 Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows, Dim columns,
                          const Shape& shape) {
   Tensor y(shape);
@@ -87,7 +97,7 @@ void for_each_maximum(const Tensor& x, Visit visit) {
 // x [N,H,W,C], y [N,H/2,W/2,C];  gx[where the largest was] += gy
 Variable max_pool2d(const Variable& x) {
   check_rank("max_pool2d", "x", x, 4);
-  if (x.dim(1) < 2 || x.dim(2) < 2) refuse("max_pool2d", "x must be at least 2x2, got " + x.shape().text());
+  if (x.dim(1) < 2 || x.dim(2) < 2) refuse("max_pool2d", "x", "H, W >= 2", x.shape().text());
   Tensor y(Shape{x.dim(0), x.dim(1) / 2, x.dim(2) / 2, x.dim(3)});
   for_each_maximum(x.value(), [&](Dim from, Dim to) { y.data()[to] = x.value().data()[from]; });
   return record("max_pool2d", y, {&x}, [](Backward& g) {
@@ -99,12 +109,9 @@ Variable max_pool2d(const Variable& x) {
 
 // xs[i] [...,last i] -> y [..., sum of last i], side by side;  gx[i] += its columns of gy
 Variable concat(std::span<const Variable> xs) {
-  if (xs.empty() || xs.size() > kMaxInputs) {
-    refuse("concat",
-           "takes 1 to " + std::to_string(kMaxInputs) + " inputs, got " + std::to_string(xs.size()));
-  }
-  check_defined("concat", "x0", xs[0]);
-  if (xs[0].rank() < 1) refuse("concat", "x0 expects at least rank 1, got " + xs[0].shape().text());
+  if (xs.empty() || xs.size() > kMaxInputs)
+    refuse("concat", "xs", "1 to " + std::to_string(kMaxInputs) + " inputs", std::to_string(xs.size()));
+  check_has_columns("concat", "x0", xs[0]);
   std::array<const Variable*, kMaxInputs> inputs{};
   Dim width = 0;
   for (std::size_t i = 0; i < xs.size(); ++i) {
@@ -137,18 +144,15 @@ Variable concat(std::span<const Variable> xs) {
 }
 
 static void check_runs(const Variable& x, const Runs& r) {
-  check_defined("take_runs", "x", x);
-  if (x.rank() < 1) refuse("take_runs", "x expects at least rank 1, got " + x.shape().text());
-  if (x.requires_grad()) refuse("take_runs", "x wants a gradient, which this op does not have");
-  if (r.first < 0 || r.run < 1 || r.step < r.run || r.width < r.run || r.width % r.run != 0) {
-    refuse("take_runs", "runs expects first >= 0, run >= 1, step >= run and width a multiple of run, got " +
-                            std::to_string(r.first) + ", " + std::to_string(r.run) + ", " +
-                            std::to_string(r.step) + " and " + std::to_string(r.width));
-  }
+  check_has_columns("take_runs", "x", x);
+  check_no_gradient("take_runs", "x", x);
+  if (r.first < 0 || r.run < 1 || r.step < r.run || r.width < r.run || r.width % r.run != 0)
+    refuse("take_runs", "runs", "first >= 0, run >= 1, step >= run and width a multiple of run",
+           std::to_string(r.first) + ", " + std::to_string(r.run) + ", " + std::to_string(r.step) + " and " +
+               std::to_string(r.width));
   const Dim end = r.first + (r.width / r.run - 1) * r.step + r.run;
-  if (end > x.dim(x.rank() - 1)) {
-    refuse("take_runs", "x expects at least " + std::to_string(end) + " columns, got " + x.shape().text());
-  }
+  if (end > x.dim(x.rank() - 1))
+    refuse("take_runs", "x", std::to_string(end) + " columns or more", x.shape().text());
 }
 
 // x [...,columns] -> y [...,width]: from column `first` on `run` columns, and so on every `step` columns
@@ -169,12 +173,12 @@ Variable take_runs(const Variable& x, const Runs& r) {
 // windows [N,T,rows * columns * channels] -> y [N,rows,columns,channels], the last of T
 Variable last_frame(const Variable& x, Dim rows, Dim columns, Dim channels) {
   check_rank("last_frame", "windows", x, 3);
-  if (std::min({rows, columns, channels}) < 1)
-    refuse("last_frame", "rows, columns and channels must be at least 1, got " + std::to_string(rows) + ", " +
-                             std::to_string(columns) + " and " + std::to_string(channels));
+  check_at_least("last_frame", "rows", rows, 1);
+  check_at_least("last_frame", "columns", columns, 1);
+  check_at_least("last_frame", "channels", channels, 1);
   const Dim images = x.dim(0), frames = x.dim(1), signals = rows * columns * channels;
   check_shape("last_frame", "windows", x, {images, std::max<Dim>(frames, 1), signals});
-  if (x.requires_grad()) refuse("last_frame", "windows want a gradient, which this op does not have");
+  check_no_gradient("last_frame", "windows", x);
   Tensor y(Shape{images, rows, columns, channels});
   move_columns(images, signals, x.value().data(), {frames * signals, (frames - 1) * signals}, Into::overwrite,
                y.data(), {signals, 0});
@@ -184,7 +188,7 @@ Variable last_frame(const Variable& x, Dim rows, Dim columns, Dim channels) {
 // x [N,P...,C] -> y [N, C * pixels];  gx is gy the other way
 Variable flatten_channels_first(const Variable& x) {
   check_defined("flatten_channels_first", "x", x);
-  if (x.rank() < 3) refuse("flatten_channels_first", "x expects rank 3 or 4, got " + x.shape().text());
+  if (x.rank() < 3) refuse("flatten_channels_first", "x", "rank 3 or 4", x.shape().text());
   const Dim channels = x.dim(x.rank() - 1), images = x.dim(0);
   const Dim pixels = x.rank() == 3 ? x.dim(1) : x.dim(1) * x.dim(2);
   return transpose_inner("flatten_channels_first", x, images, pixels, channels, {images, channels * pixels});
@@ -194,16 +198,12 @@ Variable flatten_channels_first(const Variable& x) {
 Variable unflatten_channels_first(const Variable& x, std::span<const Dim> pixels) {
   check_rank("unflatten_channels_first", "x", x, 2);
   if (pixels.empty() || pixels.size() > 2)
-    refuse("unflatten_channels_first",
-           "pixels must be {L} or {H,W}, got " + std::to_string(pixels.size()) + " sizes");
-  for (const Dim side : pixels)
-    if (side < 1)
-      refuse("unflatten_channels_first", "pixels must be at least 1 a side, got " + std::to_string(side));
+    refuse("unflatten_channels_first", "pixels", "{L} or {H,W}", std::to_string(pixels.size()) + " sizes");
+  for (const Dim side : pixels) check_at_least("unflatten_channels_first", "pixels", side, 1);
   const Dim count = pixels.size() == 1 ? pixels[0] : pixels[0] * pixels[1];
-  if (x.dim(1) % count != 0) {
-    refuse("unflatten_channels_first",
-           "x " + x.shape().text() + " does not divide into " + std::to_string(count) + " pixels");
-  }
+  if (x.dim(1) % count != 0)
+    refuse("unflatten_channels_first", "x", "a multiple of " + std::to_string(count) + " columns",
+           x.shape().text());
   const Dim images = x.dim(0), channels = x.dim(1) / count;
   const Shape shape =
       pixels.size() == 1 ? Shape{images, pixels[0], channels} : Shape{images, pixels[0], pixels[1], channels};

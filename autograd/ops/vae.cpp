@@ -12,9 +12,7 @@ using kernels::exp_same_bits;
 Variable sample_gaussian(const Variable& mean, const Variable& log_var, const Tensor& eps) {
   check_rank("sample_gaussian", "mean", mean, 2);
   check_same_shape("sample_gaussian", "mean", mean, "log_var", log_var);
-  if (eps.shape() != mean.shape()) {
-    refuse("sample_gaussian", "eps expects " + mean.shape().text() + ", got " + eps.shape().text());
-  }
+  if (eps.shape() != mean.shape()) refuse("sample_gaussian", "eps", mean.shape().text(), eps.shape().text());
   Tensor z(mean.shape());
   each(z.size(), [m = mean.value().data(), v = log_var.value().data(), e = eps.data(), to = z.data()](Dim i) {
     to[i] = m[i] + exp_same_bits(v[i] / 2) * e[i];
@@ -34,7 +32,7 @@ Variable kl_divergence(const Variable& mean, const Variable& log_var) {
   check_rank("kl_divergence", "mean", mean, 2);
   check_same_shape("kl_divergence", "mean", mean, "log_var", log_var);
   const Dim rows = mean.dim(0);
-  if (rows == 0) refuse("kl_divergence", "mean expects a row or more, got " + mean.shape().text());
+  if (rows == 0) refuse("kl_divergence", "mean", "a row or more", mean.shape().text());
   const double total =
       kernels::sum_of(mean.size(), [m = mean.value().data(), v = log_var.value().data()](Dim i) {
         return 1 + v[i] - m[i] * m[i] - exp_same_bits(v[i]);

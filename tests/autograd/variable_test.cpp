@@ -86,10 +86,10 @@ TEST(Backward, FreesTheGraph) {
   backward(loss);
   EXPECT_FALSE(middle.grad().defined());
   expect_refusal(
-      "backward: the graph of this loss was freed by an earlier backward; run the forward pass again",
+      "backward: sum expects its graph, got one that an earlier backward freed; run the forward pass again",
       [&] { backward(loss); });
   expect_refusal(
-      "backward: scale belongs to a graph that an earlier backward freed; run the forward pass again",
+      "backward: scale expects its graph, got one that an earlier backward freed; run the forward pass again",
       [&] { backward(sum(middle)); });
   const Variable fresh = 3 * x;
   backward(sum(fresh));  // a refused backward leaves nothing in the queue
@@ -107,9 +107,10 @@ TEST(Backward, FreesWhatAReverseStepHolds) {
 
 TEST(Backward, RefusesWhatHasNoGradient) {
   const Variable x = parameter(Tensor::full({2}, 3));
-  expect_refusal("backward: the loss must be a scalar, shape is [2]", [&] { backward(1 * x); });
-  expect_refusal("backward: the loss does not depend on any variable that requires a gradient",
-                 [&] { backward(sum(Variable(Tensor::full({2}, 3)))); });
+  expect_refusal("backward: loss expects one element, got [2]", [&] { backward(1 * x); });
+  expect_refusal(
+      "backward: loss expects to depend on a variable that requires a gradient, got one that depends on none",
+      [&] { backward(sum(Variable(Tensor::full({2}, 3)))); });
 }
 
 TEST(Backward, AStepThatThrowsLeavesTheLeavesUsable) {
@@ -124,11 +125,11 @@ TEST(Backward, AStepThatThrowsLeavesTheLeavesUsable) {
 TEST(Backward, RefusesAGradientOfAnotherShape) {
   Variable x = parameter(Tensor::full({2}, 3)), loss = sum(x);
   x.mutable_grad() = Tensor::zeros({1});
-  expect_refusal("backward: the gradient of [2] expects that shape, got [1]", [&] { backward(loss); });
+  expect_refusal("backward: the gradient of leaf expects [2], got [1]", [&] { backward(loss); });
   x.drop_grad();
   loss = sum(x);
   loss.mutable_grad() = Tensor::zeros({0});
-  expect_refusal("backward: the gradient of [] expects that shape, got [0]", [&] { backward(loss); });
+  expect_refusal("backward: the gradient of sum expects [], got [0]", [&] { backward(loss); });
 }
 
 TEST(Trace, OnePerThread) {
@@ -203,7 +204,7 @@ TEST(Backward, AGraphMayBeContinuedOnAnotherThread) {
 TEST(Record, TakesAtMostEightInputs) {
   const Variable x = parameter(Tensor::full({1}, 1));
   const std::vector<const Variable*> inputs(9, &x);
-  expect_refusal("nine: at most 8 inputs, got 9",
+  expect_refusal("nine: inputs expects at most 8, got 9",
                  [&] { record("nine", Tensor::zeros({1}), inputs, [](Backward&) {}); });
 }
 

@@ -69,8 +69,9 @@ TEST(Activations, Empty) {
 
 TEST(Activations, RefusesBadSettings) {
   const Variable x(Tensor::zeros({1}));
-  expect_refusal("leaky_relu: slope must not be negative, got -0.500000", [&] { leaky_relu(x, real(-0.5)); });
-  expect_refusal("clamp: low must not exceed high, got 2.000000 and 1.000000", [&] { clamp(x, 2, 1); });
+  expect_refusal("leaky_relu: negative_slope expects 0 or more, got -0.500000",
+                 [&] { leaky_relu(x, real(-0.5)); });
+  expect_refusal("clamp: low expects at most high, 1.000000, got 2.000000", [&] { clamp(x, 2, 1); });
 }
 
 // f stored by the op itself and f as an op behind it: the same bytes, forwards and backwards.
@@ -111,9 +112,10 @@ TEST(FusedActivation, IsTheActivationBehindTheOp) {
 
 TEST(FusedActivation, RefusesANegativeSlope) {
   const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
-  expect_refusal("linear: slope must not be negative, got -0.500000", [&] { linear(x, w, b, real(-0.5)); });
+  expect_refusal("linear: negative_slope expects 0 or more, got -0.500000",
+                 [&] { linear(x, w, b, real(-0.5)); });
   const Variable line(Tensor::zeros({1, 4, 3})), taps(Tensor::zeros({3, 3, 5}));
-  expect_refusal("conv1d: slope must not be negative, got -0.500000",
+  expect_refusal("conv1d: negative_slope expects 0 or more, got -0.500000",
                  [&] { conv1d(line, taps, b, {.padding = 1, .negative_slope = real(-0.5)}); });
 }
 

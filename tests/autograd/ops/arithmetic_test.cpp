@@ -38,9 +38,9 @@ TEST(Arithmetic, Empty) {
 
 TEST(Arithmetic, RefusesOtherShapes) {
   const Variable a(Tensor::zeros({2, 3})), b(Tensor::zeros({3, 2}));
-  expect_refusal("add: a and b must have the same shape, got [2,3] and [3,2]", [&] { a + b; });
-  expect_refusal("multiply: a and b must have the same shape, got [2,3] and [3,2]", [&] { a* b; });
-  expect_refusal("subtract: a and b must have the same shape, got [2,3] and [3,2]", [&] { a - b; });
+  expect_refusal("add: b expects the shape of a, [2,3], got [3,2]", [&] { a + b; });
+  expect_refusal("multiply: b expects the shape of a, [2,3], got [3,2]", [&] { a* b; });
+  expect_refusal("subtract: b expects the shape of a, [2,3], got [3,2]", [&] { a - b; });
   expect_refusal("subtract: x expects a value, got an empty Variable", [] { 1 - Variable(); });
 }
 

@@ -37,7 +37,7 @@ TEST(Attention, RefusesOtherShapes) {
     global_mean(Variable(Tensor::zeros({2, 0, 4, 3})));
   });
   expect_refusal("gated_sum: x expects rank 4, got [2,3]", [&] { gated_sum(flat, flat, flat); });
-  expect_refusal("gated_sum: a and x must have the same shape, got [2,3] and [2,4,4,3]",
+  expect_refusal("gated_sum: x expects the shape of a, [2,3], got [2,4,4,3]",
                  [&] { gated_sum(flat, x, flat); });
   expect_refusal("gated_sum: s expects [2,3], got [3,2]", [&] {
     gated_sum(x, x, Variable(Tensor::zeros({3, 2})));

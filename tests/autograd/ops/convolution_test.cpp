@@ -50,29 +50,31 @@ TEST(Conv, RefusesWithNames) {
   expect_refusal("conv2d: x expects rank 4, got [2,3]", [&] { conv2d(flat, w, b, {}); });
   expect_refusal("conv1d: x expects rank 3, got [4,40,40,3]", [&] { conv1d(x, w, b, {}); });
   expect_refusal("conv2d: w expects rank 4, got [2,3]", [&] { conv2d(x, flat, b, {}); });
-  expect_refusal("conv2d: w expects 8 input channels, x has 3 (x [4,40,40,3], w [3,3,8,16])",
+  expect_refusal("conv2d: x expects 8 channels, as w [3,3,8,16], got [4,40,40,3]",
                  [&] { conv2d(x, w, b, {}); });
-  expect_refusal("conv_transpose2d: w expects 8 input channels, x has 3 (x [4,40,40,3], w [3,3,8,16])",
+  expect_refusal("conv_transpose2d: x expects 8 channels, as w [3,3,8,16], got [4,40,40,3]",
                  [&] { conv_transpose2d(x, w, b, {}); });
-  expect_refusal("conv2d: channels must be 1 to 4096 (x [1,3,3,0], w [3,3,0,2])", [&] {
+  expect_refusal("conv2d: w expects 1 to 4096 channels, got [3,3,0,2]", [&] {
     conv2d(Variable(Tensor::zeros({1, 3, 3, 0})), Variable(Tensor::zeros({3, 3, 0, 2})), b, {});
   });
-  expect_refusal("conv2d: the kernel must be at least 1 wide (x [4,40,40,3], w [3,0,3,16])", [&] {
+  expect_refusal("conv2d: w expects a kernel of 1 or more, got [3,0,3,16]", [&] {
     conv2d(x, Variable(Tensor::zeros({3, 0, 3, 16})), b, {.padding = 1});
   });
   expect_refusal("conv2d: b expects [16], got [2,3]", [&] { conv2d(x, w3, flat, {}); });
-  expect_refusal("conv2d: stride must be positive and padding not negative, got 0 and 0",
-                 [&] { conv2d(x, w3, b, {.stride = 0}); });
-  expect_refusal("conv2d: stride must be positive and padding not negative, got 1 and -1",
-                 [&] { conv2d(x, w3, b, {.padding = -1}); });
+  expect_refusal("conv2d: stride expects 1 or more, got 0", [&] { conv2d(x, w3, b, {.stride = 0}); });
+  expect_refusal("conv2d: padding expects 0 or more, got -1", [&] { conv2d(x, w3, b, {.padding = -1}); });
 }
 
 TEST(Conv, RefusesEmptyOutputs) {
   const Variable x(Tensor::zeros({1, 2, 2, 3})), w(Tensor::zeros({3, 3, 3, 4})), b(Tensor::zeros({4}));
-  expect_refusal("conv2d: the output would be empty (x [1,2,2,3], w [3,3,3,4], stride 1, padding 0)",
-                 [&] { conv2d(x, w, b, {}); });
   expect_refusal(
-      "conv_transpose2d: the output would be empty (x [1,2,2,3], w [3,3,3,4], stride 1, padding 2)",
+      "conv2d: x expects pixels for an output of 1 or more with w [3,3,3,4], stride 1 and padding 0, got "
+      "[1,2,2,3]",
+      [&] { conv2d(x, w, b, {}); });
+  expect_refusal(
+      "conv_transpose2d: x expects pixels for an output of 1 or more with w [3,3,3,4], stride 1 and padding "
+      "2, "
+      "got [1,2,2,3]",
       [&] { conv_transpose2d(x, w, b, {.padding = 2}); });
 }
 

@@ -31,7 +31,7 @@ TEST(Linear, RefusesOtherShapes) {
                  [] { linear(Variable(), Variable(), Variable()); });
   expect_refusal("linear: x expects rank 2, got [5]", [&] { linear(b, w, b); });
   expect_refusal("linear: w expects rank 2, got [5]", [&] { linear(x, b, b); });
-  expect_refusal("linear: w expects 5 inputs, x has 3 (x [2,3], w [5,3])", [&] {
+  expect_refusal("linear: x expects 5 columns, as w [5,3], got [2,3]", [&] {
     linear(x, Variable(Tensor::zeros({5, 3})), b);
   });
   expect_refusal("linear: b expects [5], got [3]", [&] { linear(x, w, Variable(Tensor::zeros({3}))); });

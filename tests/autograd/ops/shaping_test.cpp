@@ -54,17 +54,17 @@ TEST(Shaping, TakesRunsOfColumns) {
   const Variable x(Tensor::of({2, 6}, {0, 1, 2, 3, 4, 5, 10, 11, 12, 13, 14, 15}));
   const Variable y = take_runs(x, {.first = 1, .run = 2, .step = 3, .width = 4});
   expect_values(y.value(), {2, 4}, {1, 2, 4, 5, 11, 12, 14, 15});
-  expect_refusal("take_runs: x expects at least 7 columns, got [2,6]", [&] { take_runs(x, {2, 2, 3, 4}); });
+  expect_refusal("take_runs: x expects 7 columns or more, got [2,6]", [&] { take_runs(x, {2, 2, 3, 4}); });
   const std::string runs =
       "take_runs: runs expects first >= 0, run >= 1, step >= run and width a multiple of run, got ";
   expect_refusal(runs + "-1, 2, 3 and 4", [&] { take_runs(x, {-1, 2, 3, 4}); });
   expect_refusal(runs + "0, 0, 3 and 4", [&] { take_runs(x, {0, 0, 3, 4}); });
   expect_refusal(runs + "0, 2, 1 and 4", [&] { take_runs(x, {0, 2, 1, 4}); });
   expect_refusal(runs + "0, 2, 2 and 3", [&] { take_runs(x, {0, 2, 2, 3}); });
-  expect_refusal("take_runs: x expects at least rank 1, got []", [] {
+  expect_refusal("take_runs: x expects rank 1 or more, got []", [] {
     take_runs(Variable(Tensor::zeros({})), {0, 1, 1, 1});
   });
-  expect_refusal("take_runs: x wants a gradient, which this op does not have", [&] {
+  expect_refusal("take_runs: x expects a constant, got a variable that requires a gradient", [&] {
     take_runs(Variable(Tensor::zeros({2, 6}), true), {0, 2, 2, 4});
   });
 }
@@ -76,30 +76,31 @@ TEST(Shaping, TakesTheLastFrameOfEachWindow) {
     last_frame(Variable(Tensor::zeros({2, 4})), 1, 2, 1);
   });
   expect_refusal("last_frame: windows expects [2,2,6], got [2,2,2]", [&] { last_frame(x, 3, 2, 1); });
-  expect_refusal("last_frame: rows, columns and channels must be at least 1, got -1, -2 and 1",
-                 [&] { last_frame(x, -1, -2, 1); });
-  expect_refusal("last_frame: windows want a gradient, which this op does not have", [&] {
+  expect_refusal("last_frame: rows expects 1 or more, got -1", [&] { last_frame(x, -1, -2, 1); });
+  expect_refusal("last_frame: columns expects 1 or more, got -2", [&] { last_frame(x, 1, -2, 1); });
+  expect_refusal("last_frame: channels expects 1 or more, got 0", [&] { last_frame(x, 1, 2, 0); });
+  expect_refusal("last_frame: windows expects a constant, got a variable that requires a gradient", [&] {
     last_frame(Variable(Tensor::zeros({1, 2, 2}), true), 1, 2, 1);
   });
 }
 
 TEST(Shaping, RefusesWhatDoesNotFit) {
   const Variable x(Tensor::zeros({2, 3})), scalar(Tensor::zeros({}));
-  expect_refusal("concat: takes 1 to 8 inputs, got 0", [] { joined({}); });
-  expect_refusal("concat: takes 1 to 8 inputs, got 9", [&] { joined(std::vector<Variable>(9, x)); });
-  expect_refusal("concat: x0 expects at least rank 1, got []", [&] { joined({scalar}); });
+  expect_refusal("concat: xs expects 1 to 8 inputs, got 0", [] { joined({}); });
+  expect_refusal("concat: xs expects 1 to 8 inputs, got 9", [&] { joined(std::vector<Variable>(9, x)); });
+  expect_refusal("concat: x0 expects rank 1 or more, got []", [&] { joined({scalar}); });
   expect_refusal("concat: x1 expects [2,4], got [3,4]", [&] {
     joined({x, Variable(Tensor::zeros({3, 4}))});
   });
   expect_refusal("flatten_channels_first: x expects rank 3 or 4, got [2,3]",
                  [&] { flatten_channels_first(x); });
   expect_refusal("unflatten_channels_first: x expects rank 2, got []", [&] { unflattened(scalar, {1}); });
-  expect_refusal("unflatten_channels_first: pixels must be {L} or {H,W}, got 3 sizes", [&] {
+  expect_refusal("unflatten_channels_first: pixels expects {L} or {H,W}, got 3 sizes", [&] {
     unflattened(x, {1, 1, 1});
   });
-  expect_refusal("unflatten_channels_first: x [2,3] does not divide into 2 pixels",
+  expect_refusal("unflatten_channels_first: x expects a multiple of 2 columns, got [2,3]",
                  [&] { unflattened(x, {2}); });
-  expect_refusal("unflatten_channels_first: pixels must be at least 1 a side, got -3", [&] {
+  expect_refusal("unflatten_channels_first: pixels expects 1 or more, got -3", [&] {
     unflattened(x, {-3, -1});
   });
 }
@@ -131,7 +132,7 @@ TEST(MaxPool, RefusesOtherShapes) {
   expect_refusal("max_pool2d: x expects rank 4, got [4,4]", [] {
     max_pool2d(Variable(Tensor::zeros({4, 4})));
   });
-  expect_refusal("max_pool2d: x must be at least 2x2, got [1,1,4,3]", [] {
+  expect_refusal("max_pool2d: x expects H, W >= 2, got [1,1,4,3]", [] {
     max_pool2d(Variable(Tensor::zeros({1, 1, 4, 3})));
   });
 }
