@@ -30,6 +30,9 @@ std::vector<std::size_t> periods_of(Bytes bytes);
 /// "SLIP", "HDLC" or "COBS", which replace bytes within frames, where what stands between their marks has one
 /// size only when that is undone; empty else.
 std::string framing_of(Bytes bytes);
+/// The letters that stand at one place of all frames, `period` bytes each, more than any header has; empty
+/// where there are none, or one letter again and again, as of dead taxels.
+std::string word_in(Bytes bytes, std::size_t period);
 
 /// Periods in a row in which nothing was lost.
 struct Stretch {

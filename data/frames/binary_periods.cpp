@@ -2,10 +2,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "data/frames/binary_columns.h"
 #include "data/frames/probe.h"
 #include "io/numbers/median.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -163,6 +165,21 @@ std::string framing_of(Bytes bytes) {
       if (10 * count > 9 * frames && replaced[size] >= 2) return name;
   }
   return "";
+}
+
+std::string word_in(Bytes bytes, std::size_t period) {
+  std::string longest, word;
+  for (std::size_t c = 0; c < 2 * period && c < bytes.size(); ++c) {
+    const char byte = static_cast<char>(bytes[c]);
+    bool stays = (lower(byte) >= 'a' && lower(byte) <= 'z') || byte == '/' || byte == '_';
+    for (std::size_t at = c % period + period; stays && at < bytes.size(); at += period)
+      stays = bytes[at] == bytes[at - period];
+    word = stays ? word + byte : "";
+    const bool varied = std::set(word.begin(), word.end()).size() > 2;
+    if (varied && word.size() > std::max<std::size_t>(4, longest.size()) && word.size() <= period)
+      longest = word;
+  }
+  return longest;
 }
 
 }  // namespace supertac

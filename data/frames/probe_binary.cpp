@@ -350,21 +350,23 @@ std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
                                                 std::vector<std::string>& says) {
   std::string all;
   for (const Heard& chunk : heard) all += chunk.bytes;
-  if (const std::string framing =
-          framing_of({reinterpret_cast<const unsigned char*>(all.data()), all.size()});
-      !framing.empty()) {
-    says.push_back("frames in " + framing +
-                   ", which replaces bytes within them: no sensor's file can say so; let "
-                   "the sensor send frames of one size");
+  const Bytes bytes(reinterpret_cast<const unsigned char*>(all.data()), all.size());
+  if (const std::string framing = framing_of(bytes); !framing.empty()) {
+    says.push_back("frames in " + framing + ", which replaces bytes within them: no sensor's file " +
+                   "can say so; let the sensor send frames of one size");
     return std::nullopt;
   }
   const std::vector<BinaryReading> found = binary_readings(heard, values);
   if (found.empty() || found[0].bits > found[0].sent - kMostLead) {
-    says.push_back(
-        "binary without a period: a wrong baud rate, a checksum or type that is not known, or no sensor");
+    says.push_back("binary without a period: a wrong baud rate, an unknown checksum or type, or no sensor");
     return std::nullopt;
   }
   const BinaryReading& best = found[0];
+  if (const std::string word = word_in(bytes, best.period); !word.empty()) {
+    says.push_back("frames with words, as " + in_quotes(word) + ": OSC, MessagePack or the like, which no " +
+                   "sensor's file can describe; let the sensor send numbers alone, or as text");
+    return std::nullopt;
+  }
   // A part of the period is never outweighed; fewer values in the same bytes by 11 bits: what never
   // moves at the edge is a dead taxel or a mark, and only the shape of the array speaks for one of them.
   const auto rival = std::ranges::find_if(found, [&](const BinaryReading& r) {

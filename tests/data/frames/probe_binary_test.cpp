@@ -270,20 +270,21 @@ std::string framed(const std::string& frame, const std::string& name) {
 }
 
 TEST(ProbeBinary, FramingsAreRefusedByName) {
-  for (const std::string name : {"SLIP", "HDLC", "COBS", "seven"})
+  for (const std::string name : {"SLIP", "HDLC", "COBS", "seven", "/touch", "values"})
     for (std::uint64_t seed = 1; seed <= 6; ++seed) {
       Dice dice(seed, 5757);
       Layout layout{.sensor = {}, .heard = {{100, ""}}, .says = {}};
       std::vector<int> rest;
       for (std::size_t k = 0; k < 16; ++k) rest.push_back(static_cast<int>(100 + dice.below(900)));
       for (std::size_t n = 0; n < 250; ++n) {
-        std::string frame = name == "seven" ? "\xF0\x7D" : "\x02";
+        const bool word = name.size() == 6;  // as OSC and MessagePack have it, before numbers of two bytes
+        std::string frame = word ? name + ",iiiiiiii" : name == "seven" ? "\xF0\x7D" : "\x02";
         for (std::size_t k = 0; k < 16; ++k) {
           const int v = rest[k] + (n / 25 % 16 == k ? 900 : 0) + static_cast<int>(3 * dice.normal());
           const int low = name == "seven" ? 7 : 8;
           frame += static_cast<char>(v >> low), frame += static_cast<char>(v & ((1 << low) - 1));
         }
-        layout.heard[0].bytes += name == "seven" ? frame + "\xF7" : framed(frame, name);
+        layout.heard[0].bytes += name == "seven" ? frame + "\xF7" : word ? frame : framed(frame, name);
       }
       EXPECT_EQ(outcome_of(layout), Outcome::refused) << layout.says;
       EXPECT_NE(layout.says.find(name), std::string::npos) << layout.says;
