@@ -112,7 +112,8 @@ std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup, 
   OpenedPort opened = open_port(sensor, speedup);
   auto kept = capture.empty() ? nullptr : std::make_unique<Capture>(capture);
   if (kept)
-    opened.port = std::make_unique<CapturedPort>(std::move(opened.port), kept->writer(), Stream::board);
+    opened.port =
+        std::make_unique<CapturedPort>(std::move(opened.port), kept->writer(), JournalStream::board);
   return std::make_unique<PortSource>(std::move(opened), sensor, speedup, std::move(kept));
 }
 
@@ -122,7 +123,7 @@ std::unique_ptr<SensorSource> open_replay(const std::string& path,
   if (const std::uint64_t bytes = journal.lost_bytes + journal.torn_bytes; bytes > 0)
     note(path + ": " + std::to_string(bytes) + " damaged bytes of the journal are missing");
   const Sensor sensor = sensor_of(journal);
-  auto port = std::make_unique<ReplayPort>(journal.of(Stream::board), path, journal.lost_bytes);
+  auto port = std::make_unique<ReplayPort>(journal.of(JournalStream::board), path, journal.lost_bytes);
   return std::make_unique<PortSource>(OpenedPort{.port = std::move(port), .live = false}, sensor);
 }
 

@@ -8,7 +8,7 @@
 
 namespace supertac {
 
-CapturedPort::CapturedPort(std::unique_ptr<Port> port, JournalWriter& journal, Stream stream)
+CapturedPort::CapturedPort(std::unique_ptr<Port> port, JournalWriter& journal, JournalStream stream)
     : port_(std::move(port)), journal_(journal), stream_(stream) {}
 
 double CapturedPort::now() {

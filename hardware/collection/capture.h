@@ -14,7 +14,7 @@ namespace supertac {
 class CapturedPort : public Port {
  public:
   /// `journal` must outlive the port.
-  CapturedPort(std::unique_ptr<Port> port, JournalWriter& journal, Stream stream);
+  CapturedPort(std::unique_ptr<Port> port, JournalWriter& journal, JournalStream stream);
   const std::string& name() const override { return port_->name(); }
   unsigned baud() const override { return port_->baud(); }
   double now() override;
@@ -24,7 +24,7 @@ class CapturedPort : public Port {
  private:
   std::unique_ptr<Port> port_;
   JournalWriter& journal_;
-  Stream stream_;
+  JournalStream stream_;
 };
 
 class ReplayPort : public Port {

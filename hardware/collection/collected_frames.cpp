@@ -17,9 +17,9 @@ CollectedFrames frames_in(const Journal& journal, const Sensor& sensor) {
   const bool rig = sensor.frame.kind == FrameKind::board;
   // A damaged header may name an array of a few taxels and thousands of places without one.
   std::uint64_t most_bytes = 1 << 24;
-  for (const JournalRecord& record : journal.of(Stream::board)) most_bytes += 64 * record.bytes.size();
+  for (const JournalRecord& record : journal.of(JournalStream::board)) most_bytes += 64 * record.bytes.size();
   std::uint32_t skipped = 0;
-  for (const JournalRecord& record : journal.of(Stream::board)) {
+  for (const JournalRecord& record : journal.of(JournalStream::board)) {
     if (record.kind != RecordKind::received) continue;
     const std::uint64_t torn = decoder->counters().torn;
     bool first = true;

@@ -60,7 +60,7 @@ void end_leg(std::vector<RecordedLeg>& legs, const Leg& leg) {
 
 std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
   std::vector<RecordedLeg> legs;
-  for (const JournalRecord& record : journal.of(Stream::event)) {
+  for (const JournalRecord& record : journal.of(JournalStream::event)) {
     const std::string text = record.text();
     if (text == kRunComplete) complete = true;
     if (text.starts_with("leg ")) {

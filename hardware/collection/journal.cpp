@@ -80,7 +80,7 @@ JournalWriter::JournalWriter(const std::string& path, std::string_view header, s
                             : "; choose a folder that can be written"));
   }
   for (int copy = 0; copy < 2; ++copy) {
-    append(Stream::header, RecordKind::text, 0, std::as_bytes(std::span(header)));
+    append(JournalStream::header, RecordKind::text, 0, std::as_bytes(std::span(header)));
     flush();
   }
   if (error_.empty() && !sync_folder_of(path)) failed("its folder cannot be synced");
@@ -100,7 +100,8 @@ JournalWriter::~JournalWriter() {
   }
 }
 
-void JournalWriter::append(Stream stream, RecordKind kind, double time_s, std::span<const std::byte> bytes) {
+void JournalWriter::append(JournalStream stream, RecordKind kind, double time_s,
+                           std::span<const std::byte> bytes) {
   std::lock_guard lock(mutex_);
   if (pending_bytes_ > (64 << 20)) {
     if (error_.empty()) error_ = "journal " + path_ + ": the disk is too slow, 64 MB wait to be written";
@@ -127,7 +128,7 @@ void JournalWriter::append(Stream stream, RecordKind kind, double time_s, std::s
 }
 
 void JournalWriter::event(double time_s, std::string_view text) {
-  append(Stream::event, RecordKind::text, time_s, std::as_bytes(std::span(text)));
+  append(JournalStream::event, RecordKind::text, time_s, std::as_bytes(std::span(text)));
 }
 
 void JournalWriter::check() {
@@ -169,7 +170,7 @@ void JournalWriter::failed(const std::string& what) {
 }
 
 void JournalWriter::flush() {
-  std::map<Stream, std::vector<std::byte>> chunks;
+  std::map<JournalStream, std::vector<std::byte>> chunks;
   {
     std::lock_guard lock(mutex_);
     chunks.swap(pending_);
@@ -183,7 +184,7 @@ void JournalWriter::flush() {
   }
 }
 
-void JournalWriter::write_chunk(Stream stream, double time_s, std::span<const std::byte> payload) {
+void JournalWriter::write_chunk(JournalStream stream, double time_s, std::span<const std::byte> payload) {
   std::vector<std::byte> chunk;
   chunk.reserve(kChunkHeader + payload.size());
   put(chunk, kMagic);
@@ -228,7 +229,7 @@ void JournalWriter::discard() {
   (void)::unlink(path_.c_str());
 }
 
-const std::vector<JournalRecord>& Journal::of(Stream stream) const {
+const std::vector<JournalRecord>& Journal::of(JournalStream stream) const {
   static const std::vector<JournalRecord> kNone;
   const auto found = streams.find(stream);
   return found == streams.end() ? kNone : found->second;
@@ -237,7 +238,7 @@ const std::vector<JournalRecord>& Journal::of(Stream stream) const {
 namespace {
 
 struct Chunk {
-  Stream stream = Stream::header;
+  JournalStream stream = JournalStream::header;
   double time_s = 0;
   std::size_t size = 0;    // 0: there is no whole chunk here
   std::size_t summed = 0;  // bytes looked at to find that out
@@ -252,7 +253,7 @@ Chunk chunk_at(std::span<const std::byte> bytes) {
   const auto payload = bytes.subspan(kChunkHeader, length);
   chunk.summed = length;
   if (get<std::uint32_t>(bytes, 12) != chunk_sum(bytes.first(kChunkHeader), payload)) return chunk;
-  chunk.stream = static_cast<Stream>(get<std::uint32_t>(bytes, 4));
+  chunk.stream = static_cast<JournalStream>(get<std::uint32_t>(bytes, 4));
   if (!parse_records(payload, chunk.records)) return chunk;
   chunk.time_s = get<double>(bytes, 16);
   chunk.size = kChunkHeader + length;
@@ -284,7 +285,7 @@ Journal parse_journal(std::span<const std::byte> bytes, const std::string& name)
       bytes = bytes.subspan(skipped);
       continue;
     }
-    const bool is_header = chunk.stream == Stream::header;
+    const bool is_header = chunk.stream == JournalStream::header;
     if (is_header && !headed && chunk.records.size() == 1) {
       journal.header = chunk.records[0].text();
       headed = true;

@@ -20,7 +20,7 @@ namespace supertac {
 /// s: no time is later, nor any number of an event larger, so that no arithmetic on them can overflow.
 constexpr double kLatestTime = 1e10;
 
-enum class Stream : std::uint32_t { header = 1, board = 2, printer = 3, event = 4 };
+enum class JournalStream : std::uint32_t { header = 1, board = 2, printer = 3, event = 4 };
 
 /// What happened at a port. One record per call, so that a replay can give the same answers.
 enum class RecordKind : std::uint8_t { received = 1, timed_out = 2, sent = 3, clock = 4, text = 5 };
@@ -44,7 +44,7 @@ class JournalWriter {
   JournalWriter& operator=(const JournalWriter&) = delete;
 
   /// Never waits for the disk; what goes wrong is in check().
-  void append(Stream stream, RecordKind kind, double time_s, std::span<const std::byte> bytes);
+  void append(JournalStream stream, RecordKind kind, double time_s, std::span<const std::byte> bytes);
   void event(double time_s, std::string_view text);
   /// Throws JournalError when a write has failed: the disk is full, or gone.
   void check();
@@ -58,7 +58,7 @@ class JournalWriter {
   void run();
   void run_sync();
   void flush();
-  void write_chunk(Stream stream, double time_s, std::span<const std::byte> payload);
+  void write_chunk(JournalStream stream, double time_s, std::span<const std::byte> payload);
   void sync();
   void failed(const std::string& what);
 
@@ -66,7 +66,7 @@ class JournalWriter {
   int descriptor_ = -1;
   std::mutex mutex_;
   std::condition_variable wake_, stopping_;
-  std::map<Stream, std::vector<std::byte>> pending_;  // payloads
+  std::map<JournalStream, std::vector<std::byte>> pending_;  // payloads
   std::size_t pending_bytes_ = 0;
   std::uint64_t bytes_ = 0, most_bytes_;
   double oldest_pending_ = 0;  // recorded time of the first record in pending_
@@ -78,11 +78,11 @@ class JournalWriter {
 
 struct Journal {
   std::string header;
-  std::map<Stream, std::vector<JournalRecord>> streams;
+  std::map<JournalStream, std::vector<JournalRecord>> streams;
   std::uint64_t torn_bytes = 0;  ///< at the end, dropped
   std::uint64_t lost_bytes = 0;  ///< damaged before that, dropped
   double lost_s = 0;             ///< of the records' time, between what stands before and behind the damage
-  const std::vector<JournalRecord>& of(Stream stream) const;
+  const std::vector<JournalRecord>& of(JournalStream stream) const;
 };
 
 /// Reads the undamaged chunks of a journal. Throws FileError when the file cannot be read, JournalError when

@@ -66,14 +66,14 @@ RecorderReport record(SensorReader& board, Printer& printer, const RecorderSetti
 
 RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> printer_port,
                       const RecorderSettings& settings, JournalWriter& journal) {
-  CapturedPort captured(std::move(printer_port), journal, Stream::printer);
+  CapturedPort captured(std::move(printer_port), journal, JournalStream::printer);
   Printer printer(captured, settings.bed.limits);
   printer.link().set_watch([&] { check_stop(settings, journal); });
   printer.link().give_up_at(captured.now() + longest_run_s(settings));
   try {
     printer.connect();
     settings.home ? printer.home() : printer.confirm_origin(settings.bed.origin);
-    auto port = std::make_unique<CapturedPort>(std::move(board_port), journal, Stream::board);
+    auto port = std::make_unique<CapturedPort>(std::move(board_port), journal, JournalStream::board);
     SensorReader board({.port = std::move(port)}, settings.sensor, settings.reader);
     return record(board, printer, settings, journal);
   } catch (...) {

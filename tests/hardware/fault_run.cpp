@@ -56,7 +56,7 @@ std::string check_moves(std::vector<std::string> ran, std::vector<std::string> p
 std::string check_frames(const Journal& journal, const NumberedBoard& board, const Collection& collection) {
   std::vector<std::uint64_t> numbers;
   FrameDecoder decoder;
-  for (const JournalRecord& record : journal.of(Stream::board)) {
+  for (const JournalRecord& record : journal.of(JournalStream::board)) {
     decoder.push(record.bytes, [&](const BoardFrame& frame, std::uint64_t) {
       for (const std::uint64_t number :
            board.numbers_in([&](std::size_t k) { return frame.taxel(static_cast<int>(k)); }))

@@ -91,8 +91,9 @@ inline std::vector<std::string> moves_of(const VirtualPrinter& printer) {
 /// The run of a journal again.
 inline RecorderReport replayed(const Journal& journal, RecorderSettings settings) {
   settings.replay = true;
-  return record_palpation(std::make_unique<ReplayPort>(journal.of(Stream::board), "board"),
-                          std::make_unique<ReplayPort>(journal.of(Stream::printer), "printer"), settings);
+  return record_palpation(std::make_unique<ReplayPort>(journal.of(JournalStream::board), "board"),
+                          std::make_unique<ReplayPort>(journal.of(JournalStream::printer), "printer"),
+                          settings);
 }
 
 /// A connected driver on a simulated rig, and where the head really is. `damaged`: of the printer's answers.

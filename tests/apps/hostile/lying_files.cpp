@@ -235,7 +235,7 @@ void use_journal(const std::string& path, const RandomStream& random) {
       if (what > 3) {
         Bytes frame(rig::kFrameBytes);
         write_frame({}, std::span(frame).first<rig::kFrameBytes>());
-        writer.append(Stream::board, RecordKind::received, number(16, time), frame);
+        writer.append(JournalStream::board, RecordKind::received, number(16, time), frame);
       }
       time += 0.001;
     }

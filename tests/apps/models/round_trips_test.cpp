@@ -94,7 +94,8 @@ class RoundTrips : public Training {
     {
       JournalWriter writer(to + ".journal", read.header);
       for (const auto& [stream, records] : read.streams)
-        for (const JournalRecord& record : stream == Stream::header ? std::vector<JournalRecord>() : records)
+        for (const JournalRecord& record :
+             stream == JournalStream::header ? std::vector<JournalRecord>() : records)
           writer.append(stream, record.kind, record.time_s, record.bytes);
       writer.close();
     }

@@ -266,7 +266,7 @@ TEST(CarriedSensor, AHeaderDoesNotMakeALittleVeryLarge) {
   sensor.order.assign(4096, -1), sensor.order[0] = 0, sensor.dead.clear();
   JournalWriter writer(folder / "journal", header_of(sensor, far_bed()));
   const std::byte line[] = {std::byte{'7'}, std::byte{'\n'}};
-  for (int n = 0; n < 3000; ++n) writer.append(Stream::board, RecordKind::received, 0.01 * n, line);
+  for (int n = 0; n < 3000; ++n) writer.append(JournalStream::board, RecordKind::received, 0.01 * n, line);
   writer.close();
   EXPECT_ERROR(collection_of(read_journal(folder / "journal")), JournalError, "times what was received");
 }

@@ -34,18 +34,18 @@ TEST(Journal, GivesBackWhatWasWritten) {
   const TemporaryFolder folder;
   {
     JournalWriter writer(folder / "j", "a header");
-    writer.append(Stream::board, RecordKind::received, 1.5, frame_bytes(random_frame(1)));
+    writer.append(JournalStream::board, RecordKind::received, 1.5, frame_bytes(random_frame(1)));
     writer.event(2.5, "something");
     writer.close();
   }
   const Journal journal = read_journal(folder / "j");
   EXPECT_EQ(journal.header, "a header");
-  ASSERT_EQ(journal.of(Stream::board).size(), 1U);
-  EXPECT_EQ(journal.of(Stream::board)[0].time_s, 1.5);
-  EXPECT_EQ(journal.of(Stream::board)[0].bytes, frame_bytes(random_frame(1)));
-  EXPECT_EQ(journal.of(Stream::event)[0].text(), "something");
+  ASSERT_EQ(journal.of(JournalStream::board).size(), 1U);
+  EXPECT_EQ(journal.of(JournalStream::board)[0].time_s, 1.5);
+  EXPECT_EQ(journal.of(JournalStream::board)[0].bytes, frame_bytes(random_frame(1)));
+  EXPECT_EQ(journal.of(JournalStream::event)[0].text(), "something");
   EXPECT_EQ(journal.torn_bytes, 0U);
-  EXPECT_TRUE(journal.of(Stream::printer).empty());
+  EXPECT_TRUE(journal.of(JournalStream::printer).empty());
 }
 
 TEST(Journal, NeverOverwritesAndSaysWhyItCannotWrite) {
@@ -86,7 +86,7 @@ TEST(Journal, EveryFlippedBitIsFound) {
     const std::uint64_t header = 2 * (24 + 13 + 1);
     EXPECT_GT(journal.lost_bytes + journal.torn_bytes, 0U) << "bit " << bit;
     EXPECT_EQ(journal.header, "h") << "it stands there twice, bit " << bit;
-    EXPECT_EQ(journal.of(Stream::event).size(), bit / 8 < header ? 1U : 0U) << "bit " << bit;
+    EXPECT_EQ(journal.of(JournalStream::event).size(), bit / 8 < header ? 1U : 0U) << "bit " << bit;
   }
 }
 
@@ -94,7 +94,7 @@ TEST(Journal, TenFlippedBitsCostTheirOwnChunksOnly) {
   constexpr int kFrames = 12'000;
   const std::vector<std::byte> whole = journal_of([](JournalWriter& writer) {
     for (int i = 0; i < kFrames; ++i)
-      writer.append(Stream::board, RecordKind::received, 100 + 1e-3 * i, frame_bytes(random_frame(1)));
+      writer.append(JournalStream::board, RecordKind::received, 100 + 1e-3 * i, frame_bytes(random_frame(1)));
   });
   // Two copies of 24 + 13 + 1 bytes. One bit in each would cost everything, and how long the file is, and so
   // where a random bit lies, depends on when the writer's thread woke.
@@ -110,7 +110,7 @@ TEST(Journal, TenFlippedBitsCostTheirOwnChunksOnly) {
       damaged[at] ^= static_cast<std::byte>(1U << (random.bits(flip + 100) % 8));
     }
     const Journal journal = parse_journal(damaged, "j");
-    worst = std::min(worst, static_cast<double>(journal.of(Stream::board).size()) / kFrames);
+    worst = std::min(worst, static_cast<double>(journal.of(JournalStream::board).size()) / kFrames);
     EXPECT_GT(journal.lost_bytes, 0U);
     EXPECT_GT(journal.lost_s, 0.005);
     EXPECT_LT(journal.lost_s, 0.2);
@@ -162,7 +162,7 @@ TEST(Journal, WhatIsAppendedReachesTheFileByItselfAndAKillLeavesAWholeBeginning)
       usleep(1000);
     kill(child, SIGKILL);
     waitpid(child, nullptr, 0);
-    const auto events = read_journal(path).of(Stream::event);
+    const auto events = read_journal(path).of(JournalStream::event);
     ASSERT_GT(events.size(), 50 * round);
     for (std::size_t tick = 0; tick < events.size(); ++tick)
       ASSERT_EQ(events[tick].text(), std::to_string(tick));
