@@ -3,7 +3,7 @@
 #include "apps/check/check.h"
 #include "apps/common/command_line/program.h"
 #include "autograd/kernels/fast/isa/isa.h"
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "io/numbers/sha256.h"
 #include "models/inference/compiled/compiled_model.h"
 #include "models/training/trainer.h"

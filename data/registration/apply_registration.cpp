@@ -5,7 +5,6 @@
 #include <limits>
 #include <vector>
 
-#include "data/recordings/simulator.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "data/plates/random_plate.h"
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "io/numbers/parallel.h"
 #include "io/numbers/random.h"
 #include "io/numbers/same_bits.h"

@@ -89,11 +89,11 @@ Killed kill_once(std::uint64_t seed) {
   } else {
     try {
       const Journal journal = read_journal(run.journal());
-      const auto& board = journal.of(Stream::board);
+      const auto& board = journal.of(JournalStream::board);
       killed.stage = board.empty() ? "connecting" : "running";
       if (!board.empty()) killed.recorded_s = board.back().time_s - board.front().time_s;
       if (newest_time(journal) > 0) killed.lost_s = killed_at - newest_time(journal);
-      for (const auto& record : journal.of(Stream::event)) {
+      for (const auto& record : journal.of(JournalStream::event)) {
         if (record.text() == kRunComplete) killed.stage = "converting";
       }
       const double wall = killed_at / kSpeedup;

@@ -12,7 +12,7 @@
 #include "data/recordings/imports/table_import.h"
 #include "data/recordings/imports/text_import.h"
 #include "data/recordings/recording.h"
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
 #include "io/files/file.h"
@@ -52,7 +52,7 @@ Bytes good_journal(const std::string& path) {
   for (int i = 0; i < 50; ++i) {
     Bytes frame(rig::kFrameBytes);
     write_frame({}, std::span(frame).first<rig::kFrameBytes>());
-    writer.append(Stream::board, RecordKind::received, 1 + 1e-3 * i, frame);
+    writer.append(JournalStream::board, RecordKind::received, 1 + 1e-3 * i, frame);
   }
   writer.event(2.1, event_text(leg, true));
   writer.close();

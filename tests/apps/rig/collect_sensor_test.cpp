@@ -6,8 +6,8 @@
 #include <csignal>
 #include <thread>
 
-#include "data/recordings/finger_model.h"
 #include "data/recordings/recording.h"
+#include "data/simulation/finger_model.h"
 #include "hardware/collection/collection.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"

@@ -17,7 +17,7 @@
 
 #include "data/recordings/recording.h"
 #include "data/recordings/signals_tensor.h"
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/numbers/random.h"

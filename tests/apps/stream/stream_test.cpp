@@ -11,7 +11,7 @@
 
 #include "apps/stream/stream.h"
 #include "data/recordings/recording.h"
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "data/windows/windows.h"
 #include "hardware/ports/serial_port.h"
 

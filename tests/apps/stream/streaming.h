@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "io/files/json.h"
 #include "io/files/safetensors.h"
 #include "models/files/model_file.h"

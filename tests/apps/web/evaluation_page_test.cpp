@@ -1,5 +1,5 @@
 // supertac-evaluate --report: the page holds everything, needs nothing, and says what made it.
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "io/files/json.h"
 #include "models/files/model_file.h"
 #include "tests/apps/common/simulated_data.h"

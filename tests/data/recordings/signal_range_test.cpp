@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 

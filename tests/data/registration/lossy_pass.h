@@ -5,7 +5,7 @@
 #include <string>
 
 #include "data/plates/plate.h"
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "io/numbers/random.h"
 
 namespace supertac {

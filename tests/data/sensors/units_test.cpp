@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "data/recordings/signal_range.h"
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "data/windows/random_passes.h"
 #include "data/windows/windows.h"
 #include "io/files/file.h"

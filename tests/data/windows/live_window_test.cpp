@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "data/windows/windows.h"
 #include "io/numbers/random.h"

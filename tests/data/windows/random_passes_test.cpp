@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "data/windows/split.h"
 
 namespace supertac {

@@ -4,7 +4,7 @@
 
 #include <numeric>
 
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 
 namespace supertac {
 namespace {

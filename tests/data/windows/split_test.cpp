@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 #include "tests/data/test_recordings.h"
 #include "tests/expect_error.h"
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "data/plates/truth.h"
-#include "data/recordings/simulator.h"
 #include "data/scores/baselines.h"
+#include "data/simulation/simulator.h"
 #include "tests/data/test_recordings.h"
 #include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"

@@ -1,4 +1,4 @@
-#include "data/recordings/simulator.h"
+#include "data/simulation/simulator.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "data/recordings/presses/fit.h"
+#include "data/simulation/fit.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "data/recordings/presses/presses.h"
 #include "data/sensors/touch_rests.h"
+#include "data/simulation/presses.h"
 #include "io/files/json.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"

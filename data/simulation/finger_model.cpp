@@ -1,4 +1,4 @@
-#include "data/recordings/finger_model.h"
+#include "data/simulation/finger_model.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "data/recordings/presses/presses.h"
+#include "data/simulation/presses.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <span>
 
 #include "data/recordings/felt_taxels.h"
-#include "data/recordings/presses/scene.h"
+#include "data/simulation/scene.h"
 #include "tests/expect_error.h"
 
 namespace supertac {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/recordings/presses/fit.h"
+#include "data/simulation/fit.h"
 #include "io/numbers/median.h"
 
 namespace supertac {

@@ -1,4 +1,4 @@
-#include "data/recordings/presses/scene.h"
+#include "data/simulation/scene.h"
 
 #include <algorithm>
 #include <array>

@@ -1,10 +1,10 @@
-#include "data/recordings/presses/presses.h"
+#include "data/simulation/presses.h"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "data/recordings/presses/scene.h"
+#include "data/simulation/scene.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/same_bits.h"

@@ -1,11 +1,11 @@
-#include "data/recordings/presses/fit.h"
+#include "data/simulation/fit.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "data/recordings/presses/presses.h"
+#include "data/simulation/presses.h"
 #include "io/numbers/random.h"
 #include "tests/expect_error.h"
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 
 #include "data/plates/plate.h"
-#include "data/recordings/finger_model.h"
 #include "data/recordings/recording.h"
+#include "data/simulation/finger_model.h"
 
 namespace supertac {
 
