@@ -11,9 +11,10 @@ namespace supertac {
 using detail::Node;
 
 Tensor* Backward::grad_of(std::size_t input) {
-  const Slot slot = slot_of(input);
-  if (slot && slot.into == Into::overwrite) slot.grad->fill(0);
-  return slot.grad;
+  Node& x = *node_.inputs[input];
+  if (!x.requires_grad) return nullptr;
+  if (slot_of(input).into == Into::overwrite) x.grad.fill(0);
+  return &x.grad;
 }
 
 static void check_gradient(const Node& x) {
@@ -21,16 +22,16 @@ static void check_gradient(const Node& x) {
   refuse("backward", std::string("the gradient of ") + x.op, x.value.shape().text(), x.grad.shape().text());
 }
 
-Backward::Slot Backward::slot_of(std::size_t input) {
+Slot Backward::slot_of(std::size_t input) {
   Node& x = *node_.inputs[input];
   if (!x.requires_grad) return {};
   if (x.grad.defined()) {
     check_gradient(x);
-    return {&x.grad, Into::add};
+    return {x.grad.data(), Into::add};
   }
   x.grad =
       x.spare.shape() == x.value.shape() && x.spare.defined() ? std::move(x.spare) : Tensor(x.value.shape());
-  return {&x.grad, Into::overwrite};
+  return {x.grad.data(), Into::overwrite};
 }
 
 static thread_local ReverseWatch* reverse_watch = nullptr;

@@ -26,14 +26,8 @@ class Backward {
   /// The gradient of that input, zero-filled at first use; null when that input requires none. For steps that
   /// add to an element more than once (sums, maxima).
   Tensor* grad_of(std::size_t input);
-  /// The same without the zeros, for steps that take each element once: at first use the contents are
-  /// undefined and the step must write all of them. add_to_gradient() (autograd/ops/elementwise.h) does so.
-  struct Slot {
-    Tensor* grad = nullptr;
-    Into into = Into::add;
-    explicit operator bool() const { return grad != nullptr; }
-    real* data() const { return grad->data(); }
-  };
+  /// The same without the zeros, for kernels: at first use the contents are undefined and the kernel must
+  /// write all of them. Asked for in the order of the inputs.
   Slot slot_of(std::size_t input);
   /// dL/dy to be changed in place: this step is its only reader.
   Tensor& mutable_gy() { return node_.grad; }

@@ -71,18 +71,18 @@ Tensor::Tensor(const Tensor& other) noexcept
   if (buffer_ != nullptr) buffer_->users.fetch_add(1, std::memory_order_relaxed);
 }
 
-Tensor::Tensor(Tensor&& other) noexcept
-    : buffer_(std::exchange(other.buffer_, nullptr)),
-      values_(std::exchange(other.values_, nullptr)),
-      size_(std::exchange(other.size_, 0)),
-      shape_(std::exchange(other.shape_, Shape())) {}
+Tensor::Tensor(Tensor&& other) noexcept { swap(other); }
 
 Tensor& Tensor::operator=(Tensor other) noexcept {
+  swap(other);
+  return *this;
+}
+
+void Tensor::swap(Tensor& other) noexcept {
   std::swap(buffer_, other.buffer_);
   std::swap(values_, other.values_);
   std::swap(size_, other.size_);
   std::swap(shape_, other.shape_);
-  return *this;
 }
 
 Tensor::~Tensor() {

@@ -23,6 +23,13 @@ using real = float;
 using Dim = std::int64_t;
 /// What a kernel does with the buffer that it is given for its result.
 enum class Into { overwrite, add };
+/// Where a kernel leaves a gradient: = or +=, as `into` says, or nowhere where `data` is null. One variable
+/// may be several inputs of an op, so kernels write gradients in the order of the inputs.
+struct Slot {
+  real* data = nullptr;
+  Into into = Into::add;
+  explicit operator bool() const { return data != nullptr; }
+};
 inline constexpr int kMaxRank = 4;
 
 /// The sizes of a tensor's dimensions, outermost first. Rank 0 is a scalar with one element.
@@ -87,6 +94,7 @@ class Tensor {
     std::size_t bytes;
   };
 
+  void swap(Tensor& other) noexcept;
   Buffer* buffer_ = nullptr;
   real* values_ = nullptr;
   Dim size_ = 0;

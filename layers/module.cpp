@@ -1,7 +1,8 @@
 #include "layers/module.h"
 
 #include <cmath>
-#include <stdexcept>
+
+#include "autograd/record.h"
 
 namespace supertac {
 
@@ -27,11 +28,7 @@ std::vector<Variable> values_of(const std::vector<Parameter>& parameters) {
 }
 
 Tensor uniform_fan_in(const Shape& shape, Dim fan_in, Rng& rng) {
-  if (fan_in < 1) {
-    throw std::invalid_argument(
-        "uniform_fan_in: expects at least one input (and a kernel of at least 1), got " + shape.text() +
-        " with a fan-in of " + std::to_string(fan_in));
-  }
+  if (fan_in < 1) refuse("uniform_fan_in", "shape", "an input and a kernel of 1 or more", shape.text());
   if (rng.draws_zeros()) return Tensor::zeros(shape);
   Tensor t(shape);
   const double bound = 1 / std::sqrt(static_cast<double>(fan_in));

@@ -1,19 +1,17 @@
 #include "layers/residual.h"
 
-#include <stdexcept>
-
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/attention.h"
+#include "autograd/record.h"
 
 namespace supertac {
 namespace {
 
 Dim squeezed(Dim channels, Dim reduction) {
-  if (reduction < 1 || reduction > channels) {
-    throw std::invalid_argument("ChannelAttention: reduction must be 1 to " + std::to_string(channels) +
-                                " (the channels), got " + std::to_string(reduction));
-  }
+  if (reduction < 1 || reduction > channels)
+    refuse("ChannelAttention", "reduction", "1 to the " + std::to_string(channels) + " channels",
+           std::to_string(reduction));
   return channels / reduction;
 }
 

@@ -26,18 +26,16 @@ void check_arguments(const char* op, const Variable& x, const Variable& w, const
 }
 
 ConvSettings settings_of(const Variable& x, const Variable& w, const ConvOptions& o, bool transposed) {
-  ConvSettings s;
   const bool flat = x.rank() == 3;
-  s.height = flat ? 1 : x.dim(1);
-  s.width = x.dim(flat ? 1 : 2);
-  s.kernel_h = flat ? 1 : w.dim(0);
-  s.kernel_w = w.dim(flat ? 0 : 1);
-  s.stride_h = flat ? 1 : o.stride;
-  s.stride_w = o.stride;
-  s.padding_h = flat ? 0 : o.padding;
-  s.padding_w = o.padding;
-  s.transposed = transposed;
-  return s;
+  return {.height = flat ? 1 : x.dim(1),
+          .width = x.dim(flat ? 1 : 2),
+          .kernel_h = flat ? 1 : w.dim(0),
+          .kernel_w = w.dim(flat ? 0 : 1),
+          .stride_h = flat ? 1 : o.stride,
+          .stride_w = o.stride,
+          .padding_h = flat ? 0 : o.padding,
+          .padding_w = o.padding,
+          .transposed = transposed};
 }
 
 // Both conv and transposed conv: only the geometry differs.
@@ -61,12 +59,10 @@ Variable convolve(const char* op, const Variable& x, const Variable& w, const Va
   kernels::conv(sizes, x.value().data(), w.value().data(), b.value().data(), o.negative_slope, y.data());
   const auto reverse = [sizes, slope = o.negative_slope](Backward& g) {
     const real* gs = before_activation(g, slope);
-    if (const Backward::Slot gx = g.slot_of(0))
-      kernels::conv_grad_x(sizes, gs, g.value(1).data(), gx.into, gx.data());
-    if (const Backward::Slot gw = g.slot_of(1))
-      kernels::conv_grad_w(sizes, g.value(0).data(), gs, gw.into, gw.data());
-    if (const Backward::Slot gb = g.slot_of(2))
-      kernels::bias_grad(sizes.images * sizes.out_pixels(), sizes.cout, gs, gb.into, gb.data());
+    if (const Slot gx = g.slot_of(0)) kernels::conv_grad_x(sizes, gs, g.value(1).data(), gx.into, gx.data);
+    if (const Slot gw = g.slot_of(1)) kernels::conv_grad_w(sizes, g.value(0).data(), gs, gw.into, gw.data);
+    if (const Slot gb = g.slot_of(2))
+      kernels::bias_grad(sizes.images * sizes.out_pixels(), sizes.cout, gs, gb.into, gb.data);
   };
   const OpSettings settings{.conv = s, .negative_slope = o.negative_slope};
   return record(op, y, {&x, &w, &b}, reverse, &settings);

@@ -11,18 +11,10 @@ namespace supertac {
 
 using kernels::each;
 
-/// gx[i] += term(i) where that input wants a gradient; at first use gx[i] = term(i), without zeros being
-/// written and read again. Steps that do not go through gx element by element use Backward itself.
+/// gx[i] = or += term(i) where that input wants a gradient.
 template <class Term>
 void add_to_gradient(Backward& g, std::size_t input, Term term) {
-  const Backward::Slot slot = g.slot_of(input);
-  if (!slot) return;
-  real* const gx = slot.data();
-  if (slot.into == Into::add) {
-    each(slot.grad->size(), [=](Dim i) { gx[i] += term(i); });
-  } else {
-    each(slot.grad->size(), [=](Dim i) { gx[i] = term(i); });
-  }
+  kernels::each_into(g.value(input).size(), g.slot_of(input), term);
 }
 
 /// For the ops that end in f (ops/activations.h): refuses a negative slope.

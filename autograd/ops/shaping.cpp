@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
+#include "autograd/kernels/shaping.h"
 #include "autograd/record.h"
 #include "autograd/trace.h"
 
 namespace supertac {
+
+using kernels::move_columns;
+
 namespace {
 
 void check_has_columns(const char* op, const char* argument, const Variable& x) {
@@ -26,70 +29,15 @@ Shape with_last(const Shape& shape, Dim last) {
   return Shape(std::span<const Dim>(dims.data(), static_cast<std::size_t>(shape.rank())));
 }
 
-// Columns at .. at + length of an array of rows of this width.
-struct Columns {
-  Dim width, at;
-};
-// to[r, t.at + i] = or += from[r, f.at + i] for each row r and i < length
-void move_columns(Dim rows, Dim length, const real* from, Columns f, Into into, real* to, Columns t) {
-  for (Dim r = 0; r < rows; ++r) {
-    const real* source = from + r * f.width + f.at;
-    real* target = to + r * t.width + t.at;
-    if (into == Into::overwrite && length == 4) {
-      std::copy_n(source, 4, target);  // one move
-    } else if (into == Into::overwrite) {
-      std::copy_n(source, length, target);
-    } else {
-      for (Dim i = 0; i < length; ++i) target[i] += source[i];
-    }
-  }
-}
-
-// to[n, j, i] = or += from[n, i, j]
-void transpose(Dim images, Dim rows, Dim columns, const real* from, Into into, real* to) {
-  for (Dim n = 0; n < images; ++n, from += rows * columns, to += rows * columns) {
-    for (Dim i = 0; i < rows; ++i) {
-      for (Dim j = 0; j < columns; ++j) {
-        real& element = to[j * rows + i];
-        element = from[i * columns + j] + (into == Into::add ? element : 0);
-      }
-    }
-  }
-}
-
 // x holding [images, rows, columns], y of `shape` holding [images, columns, rows];  gx is gy the other way
 Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows, Dim columns,
                          const Shape& shape) {
   Tensor y(shape);
-  transpose(images, rows, columns, x.value().data(), Into::overwrite, y.data());
+  kernels::transpose(images, rows, columns, x.value().data(), Into::overwrite, y.data());
   return record(op, y, {&x}, [=](Backward& g) {
-    if (const Backward::Slot gx = g.slot_of(0))
-      transpose(images, columns, rows, g.gy().data(), gx.into, gx.data());
+    if (const Slot gx = g.slot_of(0))
+      kernels::transpose(images, columns, rows, g.gy().data(), gx.into, gx.data);
   });
-}
-
-// Calls visit(from, to) for each element of y with the place of the largest of its four elements of x: of
-// the first among equal ones, of a NaN if there is one.
-template <class Visit>
-void for_each_maximum(const Tensor& x, Visit visit) {
-  const Dim height = x.dim(1), width = x.dim(2), channels = x.dim(3);
-  const real* value = x.data();
-  Dim to = 0;
-  for (Dim n = 0; n < x.dim(0); ++n) {
-    for (Dim i = 0; i < height / 2; ++i) {
-      for (Dim j = 0; j < width / 2; ++j) {
-        for (Dim c = 0; c < channels; ++c) {
-          const Dim corner = ((n * height + 2 * i) * width + 2 * j) * channels + c,
-                    below = corner + width * channels;
-          Dim best = corner;
-          for (const Dim at : {corner + channels, below, below + channels}) {
-            if (value[at] > value[best] || std::isnan(value[at])) best = at;
-          }
-          visit(best, to++);
-        }
-      }
-    }
-  }
 }
 
 }  // namespace
@@ -99,11 +47,10 @@ Variable max_pool2d(const Variable& x) {
   check_rank("max_pool2d", "x", x, 4);
   if (x.dim(1) < 2 || x.dim(2) < 2) refuse("max_pool2d", "x", "H, W >= 2", x.shape().text());
   Tensor y(Shape{x.dim(0), x.dim(1) / 2, x.dim(2) / 2, x.dim(3)});
-  for_each_maximum(x.value(), [&](Dim from, Dim to) { y.data()[to] = x.value().data()[from]; });
+  kernels::max_pool2d(x.shape(), x.value().data(), y.data());
   return record("max_pool2d", y, {&x}, [](Backward& g) {
-    Tensor* gx = g.grad_of(0);
-    if (gx == nullptr) return;
-    for_each_maximum(g.value(0), [&](Dim from, Dim to) { gx->data()[from] += g.gy().data()[to]; });
+    if (Tensor* gx = g.grad_of(0))
+      kernels::max_pool2d_grad(gx->shape(), g.value(0).data(), g.gy().data(), gx->data());
   });
 }
 
@@ -136,8 +83,8 @@ Variable concat(std::span<const Variable> xs) {
                   for (std::size_t i = 0; i < count; ++i) {
                     const Shape& shape = g.value(i).shape();
                     const Dim last = shape[shape.rank() - 1];
-                    if (const Backward::Slot gx = g.slot_of(i))
-                      move_columns(rows, last, g.gy().data(), {width, from}, gx.into, gx.data(), {last, 0});
+                    if (const Slot gx = g.slot_of(i))
+                      move_columns(rows, last, g.gy().data(), {width, from}, gx.into, gx.data, {last, 0});
                     from += last;
                   }
                 });

@@ -5,11 +5,11 @@
 #include <exception>
 #include <limits>
 #include <numeric>
-#include <stdexcept>
 
+#include "autograd/kernels/conv.h"
 #include "autograd/kernels/fast/each.h"
 #include "autograd/kernels/fast/pool.h"
-#include "autograd/ops/linear.h"
+#include "autograd/record.h"
 
 namespace supertac {
 namespace {
@@ -114,21 +114,19 @@ bool is_matrix(const Shape& shape) {
 
 Adam::Adam(std::vector<Variable> parameters, const AdamOptions& options)
     : parameters_(std::move(parameters)), options_(options) {
-  const auto require = [](bool holds, const char* what, double got) {
-    if (!holds)
-      throw std::invalid_argument("Adam: expects " + std::string(what) + ", got " + std::to_string(got));
+  const auto require = [](bool holds, const char* option, const char* expected, double got) {
+    if (!holds) refuse("Adam", option, expected, std::to_string(got));
   };
   const auto in_unit = [](double beta) { return beta >= 0 && beta < 1; };
-  require(options.learning_rate >= 0, "learning_rate >= 0", options.learning_rate);
-  require(in_unit(options.beta1), "beta1 in [0,1)", options.beta1);
-  require(in_unit(options.beta2), "beta2 in [0,1)", options.beta2);
-  require(options.epsilon > 0, "epsilon > 0", options.epsilon);
-  require(options.clip_norm >= 0, "clip_norm >= 0", options.clip_norm);
+  require(options.learning_rate >= 0, "learning_rate", "0 or more", options.learning_rate);
+  require(in_unit(options.beta1), "beta1", "a number in [0,1)", options.beta1);
+  require(in_unit(options.beta2), "beta2", "a number in [0,1)", options.beta2);
+  require(options.epsilon > 0, "epsilon", "more than 0", options.epsilon);
+  require(options.clip_norm >= 0, "clip_norm", "0 or more", options.clip_norm);
   for (std::size_t k = 0; k < parameters_.size(); ++k) {
     Variable& p = parameters_[k];
     if (!p.requires_grad())
-      throw std::invalid_argument("Adam: parameter " + std::to_string(k) + ", " + p.shape().text() +
-                                  ", does not require a gradient");
+      refuse("Adam", "parameter " + std::to_string(k), "to require a gradient", "a constant");
     (options.muon && is_matrix(p.shape()) ? matrices_ : others_).push_back(k);
     p.mutable_grad() = Tensor::zeros(p.shape());
     m_.push_back(Tensor::zeros(p.shape()));
@@ -162,9 +160,8 @@ double Adam::step() {
   for (std::size_t k = 0; k < parameters_.size(); ++k) {
     const Variable& x = parameters_[k];
     if (!x.grad().defined() || x.grad().shape() != x.shape())
-      throw std::invalid_argument(
-          "Adam: parameter " + std::to_string(k) + ", " + x.shape().text() + ", expects a gradient, got " +
-          (x.grad().defined() ? x.grad().shape().text() : "none") + "; run backward() before step()");
+      refuse("Adam", "parameter " + std::to_string(k), "a gradient " + x.shape().text(),
+             (x.grad().defined() ? x.grad().shape().text() : "none") + "; run backward() before step()");
   }
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t k = 0; k < parameters_.size(); ++k)

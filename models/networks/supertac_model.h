@@ -72,7 +72,7 @@ struct Estimate {
   Tensor latents;          ///< [N,latents]; undefined for a network without any
 };
 
-/// The same on the graph.
+/// The same on the graph, of the same shapes.
 struct Prediction {
   Variable picture, predicted_error, latents;
 };

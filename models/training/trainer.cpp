@@ -60,8 +60,8 @@ Trainer::MicroBatch::MicroBatch(const Objective& master, Dim first_sample, Dim c
     Variable(own[i].value).mutable_value() = of_master[i].value.value();  // the same buffer
 }
 
-// The windows [n,T,signals] and truths [n,H,W,1] of this step, n the samples of a micro-batch, each augmented
-// by the number of its sample.
+// Takes the windows [n,T,signals] and truths [n,H,W,1] of this step, n the samples of a micro-batch, and
+// augments each by the number of its sample.
 void Trainer::fill(MicroBatch& micro_batch) const {
   const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
   const std::uint64_t epoch = static_cast<std::uint64_t>(step()) / per_epoch;
@@ -92,7 +92,7 @@ void Trainer::draw_noise(MicroBatch& micro_batch) const {
   for (real& value : micro_batch.batch.noise.values()) value = static_cast<real>(random.normal(next++));
 }
 
-// Forward, loss, backward of one micro-batch, each term weighted by its share of the batch.
+// Goes forward, through the loss and backward for one micro-batch; its share of the batch weighs each term.
 void Trainer::run(MicroBatch& micro_batch) const {
   const std::vector<Parameter>& parameters = micro_batch.objective.network().parameters();
   fill(micro_batch);
@@ -160,8 +160,8 @@ void Trainer::Variances::add(const Variances& other) {
   pictures.add(other.pictures), targets.add(other.targets), means.add(other.means);
 }
 
-// Loss terms and variances of micro-batches, then of processes, as balanced binary trees; gradients are added
-// in Trainer::apply().
+// Adds up loss terms and variances of micro-batches, then of processes, as balanced binary trees;
+// Trainer::apply() adds the gradients.
 void Trainer::add_up_statistics(StepReport& report) {
   for (std::size_t apart = 1; apart < micro_batches_.size(); apart *= 2) {
     for (std::size_t micro_batch = 0; micro_batch + apart < micro_batches_.size(); micro_batch += 2 * apart) {

@@ -48,12 +48,13 @@ class TrainingStopped : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Stands around each micro-batch of a step, on its thread: must call `run`, which fills the batch and goes
-/// forward and backward. For observers (models/training/audit/opened_step.h).
+/// A micro-batch as observers of a step see it (models/training/audit/opened_step.h).
 struct MicroBatchView {
   const Batch& batch;
   const std::vector<Parameter>& parameters;  ///< the model's values under gradients of their own
 };
+/// Stands around each micro-batch of a step, on its thread: must call `run`, which fills the batch and goes
+/// forward and backward.
 using AroundMicroBatch =
     std::function<void(std::size_t number, const MicroBatchView&, const std::function<void()>& run)>;
 

@@ -64,8 +64,7 @@ TEST(Module, InitialisationHasTheVarianceItStates) {
 TEST(Module, RefusesALayerWithoutInputs) {
   Rng rng(1);
   EXPECT_EQ(what_of<std::invalid_argument>([&] { Conv2d(3, 8, {.kernel = 0}, rng); }),
-            "uniform_fan_in: expects at least one input (and a kernel of at least 1), got [0,0,3,8] with a "
-            "fan-in of 0");
+            "uniform_fan_in: shape expects an input and a kernel of 1 or more, got [0,0,3,8]");
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ TEST(ChannelAttention, GatesStayInsideZeroAndOneAndDependOnTheMeanOnly) {
 TEST(ChannelAttention, RefusesAReductionThatLeavesNoChannel) {
   Rng rng(3);
   EXPECT_EQ(what_of<std::invalid_argument>([&] { ChannelAttention(4, 8, rng); }),
-            "ChannelAttention: reduction must be 1 to 4 (the channels), got 8");
+            "ChannelAttention: reduction expects 1 to the 4 channels, got 8");
 }
 
 TEST(ChannelAttention, MaySqueezeToOneChannel) {

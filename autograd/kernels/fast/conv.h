@@ -1,6 +1,6 @@
-// The same sums as autograd/kernels/conv.h and autograd/ops/linear.h, faster: register tiles, instruction
-// sets chosen at run time, Winograd's algorithm for batches of larger maps, another one for few
-// output channels. The shapes alone decide which one runs, so all processors agree.
+// The same sums as autograd/kernels/conv.h, faster: register tiles, instruction sets chosen at run time,
+// Winograd's algorithm for batches of larger maps, another one for few output channels. The shapes alone
+// decide which one runs, so all processors agree.
 #pragma once
 
 #include "autograd/kernels/fast/geometry.h"

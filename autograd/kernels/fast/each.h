@@ -50,6 +50,21 @@ void each(Dim n, Body body) {
   run_loop([=] { each_here(n, body); });
 }
 
+/// Calls loop(put), put(i, value) being gx[i] = or += value, where that gradient is wanted.
+template <class Loop>
+void write_into(Slot gx, Loop loop) {
+  real* const to = gx.data;
+  if (!gx) return;
+  gx.into == Into::add ? loop([to](Dim i, real value) { to[i] += value; })
+                       : loop([to](Dim i, real value) { to[i] = value; });
+}
+
+/// gx[i] = or += term(i) for all i below n.
+template <class Term>
+void each_into(Dim n, Slot gx, Term term) {
+  write_into(gx, [=](auto put) { each(n, [=](Dim i) { put(i, term(i)); }); });
+}
+
 /// The sum of term(i) over [0, n) in double precision: 16 partial sums that are added in a fixed order, so
 /// that its bits do not depend on the width of vectors.
 template <class Term>

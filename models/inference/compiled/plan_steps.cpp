@@ -1,32 +1,26 @@
 // The steps of a plan: each function packs its op's weights and adds what runs for a block of images. The
 // table at the end has one for every op that networks draw with. Winograd's are in plan_winograd.cpp.
-#include <algorithm>
 #include <array>
 
 #include "autograd/kernels/exp.h"
 #include "autograd/kernels/fast/each.h"
+#include "autograd/kernels/shaping.h"
 #include "models/inference/compiled/compiler.h"
 
 namespace supertac {
-
-template <Dim kRun>
-static void copy_runs(Dim rows, const real* from, Dim from_step, real* to, Dim to_step) {
-  for (Dim r = 0; r < rows; ++r, from += from_step, to += to_step) std::copy_n(from, kRun, to);
-}
 
 static void input_step(Compiler& compiler, const TracedOp& op) {
   const FeatureMap y = compiler.new_map(op.y);
   const Dim size = op.inputs[0].size() / op.inputs[0].dim(0);
   const InputRuns runs = InputRuns::of(op);
-  const Dim piece = runs.run % 4 == 0 ? 4 : 1;  // a row of the rig's array is one move
   compiler.add_step([=](const Block& b) {
     for (Dim n = 0; n < b.images; ++n) {
       const real* from = b.input + n * size + runs.first;
       real* line = b.first_pixel(y) + n * y.image();
       for (Dim i = 0; i < y.height; ++i, line += y.line(), from += y.width * runs.step)
-        for (Dim k = 0; k < y.channels; k += piece)
-          (piece == 4 ? copy_runs<4> : copy_runs<1>)(y.width, from + k / runs.run * runs.apart + k % runs.run,
-                                                     runs.step, line + k, y.channels);
+        for (Dim k = 0; k < y.channels; k += runs.run)
+          kernels::move_columns(y.width, runs.run, from, {runs.step, k / runs.run * runs.apart},
+                                Into::overwrite, line, {y.channels, k});
     }
   });
 }
@@ -123,9 +117,8 @@ static void unflatten_step(Compiler& compiler, const TracedOp& op) {
   compiler.add_step([=](const Block& b) {
     const Dim run = y.width * y.channels;
     for (Dim n = 0; n < b.images; ++n) {
-      const real* from = b.begin(x) + n * x.image();
-      real* line = b.first_pixel(y) + n * y.image();
-      for (Dim i = 0; i < y.height; ++i, from += run, line += y.line()) std::copy_n(from, run, line);
+      kernels::move_columns(y.height, run, b.begin(x) + n * x.image(), {run, 0}, Into::overwrite,
+                            b.first_pixel(y) + n * y.image(), {y.line(), 0});
     }
   });
 }
@@ -137,8 +130,8 @@ static void concat_step(Compiler& compiler, const TracedOp& op) {
   for (const Variable& input : op.inputs) {
     const FeatureMap x = compiler.map_of(input);
     compiler.add_step([=](const Block& b) {
-      for (Dim n = 0; n < b.images; ++n)
-        std::copy_n(b.begin(x) + n * x.channels, x.channels, b.begin(y) + n * y.channels + at);
+      kernels::move_columns(b.images, x.channels, b.begin(x), {x.channels, 0}, Into::overwrite, b.begin(y),
+                            {y.channels, at});
     });
     at += x.channels;
   }

@@ -1,10 +1,9 @@
-// The plain loops of kernels/conv.cpp and ops/linear.cpp against those of kernels/fast on every instruction
+// The plain loops of kernels/conv.cpp against those of kernels/fast on every instruction
 // set: the sets have the same bytes, and those of the plain loops where both add in the same order.
 #include "autograd/kernels/conv.h"
 
 #include "autograd/kernels/fast/conv.h"
 #include "autograd/kernels/fast/isa/isa.h"
-#include "autograd/ops/linear.h"
 #include "tests/autograd/check.h"
 
 namespace supertac::kernels {

@@ -104,26 +104,26 @@ TEST(Adam, RefusesAStepWithoutAGradient) {
   Variable x = parameter(Tensor::zeros({2, 3}));
   Adam adam({x}, {});
   x.drop_grad();
-  expect_refusal("Adam: parameter 0, [2,3], expects a gradient, got none; run backward() before step()",
+  expect_refusal("Adam: parameter 0 expects a gradient [2,3], got none; run backward() before step()",
                  [&] { adam.step(); });
   x.mutable_grad() = Tensor::zeros({2});
-  expect_refusal("Adam: parameter 0, [2,3], expects a gradient, got [2]; run backward() before step()",
+  expect_refusal("Adam: parameter 0 expects a gradient [2,3], got [2]; run backward() before step()",
                  [&] { adam.step(); });
 }
 
 TEST(Adam, RefusesBadOptions) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const auto& [options, text] :
-       {std::pair(AdamOptions{.learning_rate = -1}, "learning_rate >= 0, got -1.000000"),
-        {AdamOptions{.learning_rate = nan}, "learning_rate >= 0, got nan"},
-        {AdamOptions{.beta1 = 1}, "beta1 in [0,1), got 1.000000"},
-        {AdamOptions{.beta2 = -0.1}, "beta2 in [0,1), got -0.100000"},
-        {AdamOptions{.epsilon = 0}, "epsilon > 0, got 0.000000"},
-        {AdamOptions{.clip_norm = -1}, "clip_norm >= 0, got -1.000000"}}) {
-    expect_refusal("Adam: expects " + std::string(text),
+       {std::pair(AdamOptions{.learning_rate = -1}, "learning_rate expects 0 or more, got -1.000000"),
+        {AdamOptions{.learning_rate = nan}, "learning_rate expects 0 or more, got nan"},
+        {AdamOptions{.beta1 = 1}, "beta1 expects a number in [0,1), got 1.000000"},
+        {AdamOptions{.beta2 = -0.1}, "beta2 expects a number in [0,1), got -0.100000"},
+        {AdamOptions{.epsilon = 0}, "epsilon expects more than 0, got 0.000000"},
+        {AdamOptions{.clip_norm = -1}, "clip_norm expects 0 or more, got -1.000000"}}) {
+    expect_refusal("Adam: " + std::string(text),
                    [&, o = options] { Adam({parameter(Tensor::zeros({1}))}, o); });
   }
-  expect_refusal("Adam: parameter 0, [1], does not require a gradient",
+  expect_refusal("Adam: parameter 0 expects to require a gradient, got a constant",
                  [] { Adam({Variable(Tensor::zeros({1}))}, {}); });
 }
 

@@ -100,7 +100,7 @@ std::vector<const IsaKernels*> supported_sets();
 /// Replaces the choice, for those who compare the sets in one process; not while kernels run.
 void use_isa(const IsaKernels& set);
 
-/// No kernels of this folder at all: the plain loops of autograd/kernels/conv.cpp and autograd/ops/linear.cpp
+/// No kernels of this folder at all: the plain loops of autograd/kernels/conv.cpp
 /// run.
 extern const IsaKernels kPlainKernels;
 inline bool is_plain() { return isa_kernels().gather == nullptr; }

@@ -4,10 +4,9 @@
 #include <cmath>
 
 #include "autograd/kernels/fast/pool.h"
-#include "autograd/ops/elementwise.h"
-#include "autograd/ops/losses.h"
+#include "autograd/kernels/losses.h"
 
-namespace supertac {
+namespace supertac::kernels {
 namespace {
 
 constexpr real kC1 = real(0.01 * 0.01), kC2 = real(0.03 * 0.03);  // (K1 L)^2, (K2 L)^2 with range L = 1
@@ -116,8 +115,8 @@ class SsimImage {
   }
 
   real centre(const real* x, real* to) const {
-    const auto mean = static_cast<real>(kernels::sum_of(h_ * wd_, [x](Dim i) { return x[i]; }) /
-                                        static_cast<double>(h_ * wd_));
+    const auto mean =
+        static_cast<real>(sum_of(h_ * wd_, [x](Dim i) { return x[i]; }) / static_cast<double>(h_ * wd_));
     for (Dim i = 0; i < h_ * wd_; ++i) to[i] = x[i] - mean;
     return mean;
   }
@@ -176,29 +175,17 @@ class SsimImage {
 
 }  // namespace
 
-// x, target [N,H,W,1];  value = mean over images and positions of SSIM
-// gx = gy d value / dx; the target is a constant
-Variable ssim(const Variable& x, const Tensor& target) {
-  check_rank("ssim", "x", x, 4);
-  if (target.shape() != x.shape()) refuse("ssim", "target", x.shape().text(), target.shape().text());
-  if (x.dim(0) < 1 || x.dim(3) != 1 || std::min(x.dim(1), x.dim(2)) < 3)
-    refuse("ssim", "x", "[N,H,W,1] with H, W >= 3", x.shape().text());
-  const Dim images = x.dim(0), height = x.dim(1), width = x.dim(2), pixels = height * width;
+// x, target [n,h,w]
+double ssim(Dim images, Dim height, Dim width, const real* x, const real* target) {
   SsimImage image(height, width);
   double total = 0;
-  for (Dim n = 0; n < images; ++n)
-    total += image.value(x.value().data() + n * pixels, target.data() + n * pixels);
-  const auto value = static_cast<real>(total / static_cast<double>(images));
-  const auto reverse = [=](Backward& g) {
-    Tensor* gx = g.grad_of(0);
-    if (gx == nullptr) return;
-    SsimImage again(height, width);
-    const real each_image = g.gy().item() / static_cast<real>(images);
-    for (Dim n = 0, at = 0; n < images; ++n, at += pixels)
-      again.add_gradient(g.value(0).data() + at, target.data() + at, each_image, gx->data() + at);
-  };
-  const OpSettings settings{.constant = target};
-  return record("ssim", Tensor::full({}, value), {&x}, reverse, &settings);
+  for (Dim n = 0, at = 0; n < images; ++n, at += height * width) total += image.value(x + at, target + at);
+  return total;
+}
+void ssim_grad(Dim images, Dim height, Dim width, real g, const real* x, const real* target, real* gx) {
+  SsimImage image(height, width);
+  for (Dim n = 0, at = 0; n < images; ++n, at += height * width)
+    image.add_gradient(x + at, target + at, g, gx + at);
 }
 
-}  // namespace supertac
+}  // namespace supertac::kernels
