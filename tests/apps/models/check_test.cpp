@@ -18,12 +18,11 @@
 namespace supertac {
 namespace {
 
-// The ops whose results are recorded, by the sources themselves: record("name", ...), or a function that is
-// given the name. What takes inputs apart has no gradient.
+// The ops whose results are recorded, by the sources themselves: record("name", ...), or another function
+// that is given the name and does not refuse arguments. What takes inputs apart has no gradient.
 std::set<std::string> ops_in_sources() {
   std::set<std::string> names;
-  const std::regex recorded(
-      R"re((?:record|elementwise|rectify|convolve|transpose_inner)\(\s*"([a-z0-9_]+)")re");
+  const std::regex recorded(R"re(\b(?!check_|refuse)\w+\(\s*"([a-z0-9_]+)")re");
   for (const auto& entry : std::filesystem::directory_iterator(SUPERTAC_SOURCE "/autograd/ops")) {
     if (entry.path().extension() != ".cpp") continue;
     const std::string text = read_text_file(entry.path(), 1 << 20);
