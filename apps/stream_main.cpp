@@ -76,6 +76,11 @@ void declare(Arguments& a) {
               "keep time, signals and picture of every frame (safetensors, 2.2 MB/s at 16x16); '-': a line "
               "of JSON for each on stdout")
       .writes()
+      .option("mcap", "FILE",
+              "keep taxels and pictures as ROS 2 messages in an MCAP file, which Foxglove, Rerun, "
+              "PlotJuggler and "
+              "ros2 bag open")
+      .writes()
       .option("map", "FILE",
               "keep the surface that was felt, as far as the finger's places are known: .png, .safetensors, "
               ".csv (its elements) or .stl (docs/map.md)")
@@ -173,6 +178,7 @@ int run(Arguments& a) {
   const double begin = monotonic_seconds();
   const double speedup = a.number("speedup", 0.1, 100);
   StreamSettings settings{.out = probed ? "" : a.output("out"),
+                          .mcap = a.output("mcap"),
                           .record = a.text("record"),
                           .plate = a.text("plate"),
                           .map = a.output("map"),

@@ -3,7 +3,7 @@
 
     supertac-stream --sensor mat.json --model model.safetensors --out - | examples/ros2_node.py
 
-The topics and messages are those of examples/to_mcap.py, whose file `ros2 bag play` replays without this node.
+The topics and messages are those of supertac-stream --mcap, whose file `ros2 bag play` replays without this node.
 """
 import array
 import json

@@ -16,7 +16,7 @@ newcomer() {
   "$@" simulate --out "$home/d" --plates 6_Ridges --passes 2 --speeds 10 --quiet
   "$@" train --data "$home/d" --out "$home/m.safetensors" --preset tiny --split none --epochs 1 --stride 64 --quiet
   "$@" stream --recording "$home/d/6_Ridges_t1_p1_v10.safetensors" --model "$home/m.safetensors" --out "$home/p.safetensors" \
-    --seconds 3 --quiet
+    --mcap "$home/p.mcap" --seconds 3 --quiet
   "$@" export "$home/m.safetensors" --onnx "$home/m.onnx" --quiet
   for file in m p; do "$@" info "$home/$file.safetensors" | grep content; done
 }

@@ -62,6 +62,9 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
     pipe_ = std::make_unique<PipeOutput>(STDOUT_FILENO, !source.live());
   else if (!settings.out.path.empty())
     log_ = std::make_unique<PictureLog>(settings.out, format);
+  if (!settings.mcap.path.empty())
+    mcap_ = std::make_unique<McapLog>(settings.mcap, source.array(), source.signal_scale(), format.image,
+                                      format.half_widths);
   if (maker_ && (settings.web || !settings.map.path.empty()))
     map_.emplace(maker_->image(), models.front().model->settings().timesteps > 1);
   about_lines_ = about_lines(source.array(), source.signal_scale().unit, format.image);
@@ -141,6 +144,8 @@ void Stream::complete() {
   };
   if (record_) attempt([&] { record_->write(recording_); });
   if (log_) attempt([&] { log_->write(maker_ ? settings_.metadata : recording_); });
+  const bool any = maker_ ? pictures() > 0 : frames_ > 0;
+  if (mcap_ && any) attempt([&] { mcap_->close(); });
   if (!settings_.map.path.empty()) attempt([&] { write_map(); });
   attempt([&] { source_.finish(); });
   if (first) std::rethrow_exception(first);
@@ -274,6 +279,7 @@ void Stream::keep_raw(const SensorFrame& frame) {
 
 void Stream::output(const LiveFrame& seen) {
   if (log_) log_->add(seen);
+  if (mcap_) mcap_->add(seen.time_s, seen.wall_s, seen.signals, seen.picture, seen.half_widths);
   if (!pipe_) return;
   const SignalScale scale = source_.signal_scale();
   const FrameLoad load = load_of(seen.signals, source_.array().channels, scale);

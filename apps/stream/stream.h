@@ -11,6 +11,7 @@
 
 #include "apps/common/running/progress.h"
 #include "apps/stream/latency_histogram.h"
+#include "apps/stream/mcap_log.h"
 #include "apps/stream/picture_log.h"
 #include "apps/stream/picture_maker.h"
 #include "apps/stream/pressed_order.h"
@@ -26,6 +27,7 @@ struct StreamSettings {
   double seconds = std::numeric_limits<double>::infinity();  ///< of signal, after which run() ends
   OutputPath out = "";  ///< file that keeps the pictures; "-": a line for each to stdout; empty: none
   Precision precision = Precision::fp32;
+  OutputPath mcap = "";              ///< MCAP file that keeps frames and pictures; empty: none
   std::string record = {};           ///< folder that gets a recording; empty: none
   std::string plate = "unknown";     ///< of the recording: a plate's name or an STL file
   OutputPath map = "";               ///< file of the surface that was felt; empty: none
@@ -91,6 +93,7 @@ class Stream {
   std::string record_path_, record_remark_;
   std::string about_lines_;
   std::unique_ptr<PictureLog> log_, record_;
+  std::unique_ptr<McapLog> mcap_;
   std::unique_ptr<TerminalLine> view_;
   std::unique_ptr<PipeOutput> pipe_;
   std::unique_ptr<Recorder> recorder_;  // at the page's wish

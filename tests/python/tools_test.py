@@ -1,19 +1,20 @@
 #!/usr/bin/env python3
-"""What examples/to_mcap.py writes, opened by the public readers (PyPI: mcap, mcap-ros2-support; rosbags has the
-definitions of the ROS messages; rerun-sdk): the taxels and pictures of supertac-stream --out, with sizes and times. Where
-h5py and lerobot are installed, what examples/to_hdf5.py and examples/to_lerobot.py make of the same file.
+"""What --mcap writes, opened by the public readers (PyPI: mcap, mcap-ros2-support; rosbags has the definitions of the ROS
+messages; rerun-sdk): the taxels and pictures of supertac-stream --out, with sizes, times and units. Where h5py and
+lerobot are installed, what examples/to_hdf5.py and examples/to_lerobot.py make of the same file.
 
     tests/python/tools_test.py BIN
 
 77 where a reader is not installed.
 """
-import json
 import os
 import pathlib
 import shutil
+import socket
 import subprocess
 import sys
 import tempfile
+import time
 
 from ours import BIN, ROOT, np, run, supertac
 
@@ -28,6 +29,8 @@ except ImportError as missing:
 TOPICS = {"/supertac/taxels": "std_msgs/msg/Float32MultiArray", "/supertac/picture": "sensor_msgs/msg/Image",
           "/supertac/half_width": "sensor_msgs/msg/Image", "/supertac/total_force": "std_msgs/msg/Float32",
           "/supertac/saturated": "std_msgs/msg/UInt32"}
+SENSOR = """{"name": "mat", "rows": 2, "columns": 3, "pitch_mm": 5, "channels": 1, "unit": "counts", "pressed": "higher",
+"range": [40, 900], "rate_hz": 100, "port": "udp::%d", "frame": {"kind": "text", "separator": ","}}"""
 
 
 def contents(path):
@@ -52,7 +55,7 @@ def values(image):
     return np.frombuffer(bytes(image.data), "<f4").reshape(image.height, image.width)
 
 
-def check_pictures(path, log, array, began_s):
+def check_pictures(path, log, array, pixel_mm, began_s):
     found = contents(path)
     assert sorted(found) == sorted(TOPICS), sorted(found)
     share = (2.45 - log.volts) / np.float64(0.36)  # of the rig's range
@@ -69,6 +72,8 @@ def check_pictures(path, log, array, began_s):
             drawn = [values(message) for message in messages]
             stamps = [m.header.stamp.sec + m.header.stamp.nanosec / 1e9 for m in messages]
             assert np.abs(stamps - logged).max() < 1e-6
+            assert channel.metadata["pixel_mm"] == pixel_mm
+        assert channel.metadata["unit"] == ("V" if topic == "/supertac/taxels" else "1: the highest of the truth")
         assert np.array_equal(np.array(drawn, np.float32), kept), topic
     print(f"{path.name}: {len(log.time_s)} of each topic, the same bits")
 
@@ -117,23 +122,29 @@ def check_lerobot(folder, log, seen):
     print(f"episodes: {len(data)} frames, the same bits")
 
 
-def check_array(folder):
-    """An array of three axes alone: its picture is the array."""
-    path, out = folder / "axes.safetensors", folder / "axes.mcap"
-    signals = {"unit": "counts", "pressed": "higher", "range": [0, 100]}
-    supertac.write_recording(path, supertac.Recording(
-        np.arange(20) / 50, np.arange(360).reshape(20, 18).astype("f4") % 100,
-        array={"rows": 2, "columns": 3, "pitch_mm": 5, "channels": 3}, metadata={"signals": json.dumps(signals)}))
-    convert("to_mcap.py", out, path)
+def check_live(folder):
+    """An array alone, as it comes: the wall clock is that of its arrival."""
+    sensor, out = folder / "mat.json", folder / "live.mcap"
+    device = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    device.bind(("127.0.0.1", 0))
+    port = device.getsockname()[1] % 60000 + 1024  # another than the device's own
+    sensor.write_text(SENSOR % port)
+    before = time.time()
+    program = subprocess.Popen([BIN / "supertac-stream", "--sensor", sensor, "--mcap", out, "--seconds",
+                                "2", "--quiet"], stdout=subprocess.DEVNULL)
+    while program.poll() is None:
+        device.sendto(b"1,2,3,40,50,60", ("127.0.0.1", port))
+        time.sleep(0.01)
+    assert program.returncode == 0
     found = contents(out)
-    layout = found["/supertac/taxels"][3][0].layout
-    assert [(d.label, d.size, d.stride) for d in layout.dim] == [("rows", 2, 18), ("columns", 3, 9), ("channels", 3, 3)]
-    image = found["/supertac/picture"][3][1]
-    assert (image.height, image.width, image.encoding, image.step) == (2, 3, "32FC3", 36)
-    assert np.frombuffer(bytes(image.data), "<f4").tolist() == list(range(18, 36))
-    force = np.sqrt(((np.arange(18).reshape(6, 3) / 100) ** 2).sum(axis=1)).sum()
-    assert abs(found["/supertac/total_force"][3][0].data - force) < 1e-6 and "/supertac/half_width" not in found
-    print(f"{out.name}: {len(found['/supertac/taxels'][3])} frames of three axes")
+    channel, logged, _, messages = found["/supertac/taxels"]
+    assert channel.metadata["unit"] == "counts" and len(messages) > 10
+    assert [(d.label, d.size, d.stride) for d in messages[0].layout.dim] == [("rows", 2, 6), ("columns", 3, 3),
+                                                                              ("channels", 1, 1)]
+    image = values(found["/supertac/picture"][3][-1])
+    assert image.shape == (2, 3) and image[1].tolist() == [40, 50, 60]
+    assert before - 1 < logged.min() <= logged.max() < time.time() + 1, (before, logged.min())
+    print(f"{out.name}: {len(messages)} frames at {channel.metadata['array']}")
 
 
 def main():
@@ -144,19 +155,17 @@ def main():
         recording, model = next((folder / "data").glob("*.safetensors")), folder / "model.safetensors"
         run("supertac-train", "--data", folder / "data", "--out", model, "--preset", "tiny", "--split", "none", "--epochs",
             1, "--stride", 24, "--quiet")
-        log, converted = folder / "log.safetensors", folder / "log.mcap"
-        run("supertac-stream", "--recording", recording, "--model", model, "--out", log, "--quiet")
+        log, streamed = folder / "log.safetensors", folder / "streamed.mcap"
+        run("supertac-stream", "--recording", recording, "--model", model, "--out", log, "--mcap", streamed, "--quiet")
         seen = supertac.read_pictures(log)
-        convert("to_mcap.py", converted, log)
-        check_pictures(converted, seen, [("rows", 4), ("columns", 4), ("channels", 1)], 0)
-        tensors, metadata = supertac.read(log)
+        check_pictures(streamed, seen, [("rows", 4), ("columns", 4), ("channels", 1)], "0.75", 0)
+        tensors, metadata = supertac.read(recording)
         kept = {key: text for key, text in metadata.items() if key not in ("checksum", "supertac_format")}
-        supertac.write(log, tensors, kept | {"began_s": "1700000000.5"})
-        converted.unlink()
-        convert("to_mcap.py", converted, log)
-        check_pictures(converted, seen, [("rows", 4), ("columns", 4), ("channels", 1)], 1700000000.5)
-        check_array(folder)
-        check_rerun(converted)
+        supertac.write(recording, tensors, kept | {"began_s": "1700000000.5"})
+        run("supertac-stream", "--recording", recording, "--model", model, "--mcap", streamed, "--quiet", "--force")
+        check_pictures(streamed, seen, [("rows", 4), ("columns", 4), ("channels", 1)], "0.75", 1700000000.5)
+        check_live(folder)
+        check_rerun(streamed)
         check_hdf5(folder, log, seen)
         check_lerobot(folder, log, seen)
 

@@ -60,8 +60,9 @@ constexpr double kPatienceS = 1, kHangS = 10;
 constexpr long kMostKilobytes = 1 << 20;
 constexpr std::uint64_t kMost = 1 << 26;  // bytes of a file that is compared
 // By --force a user gives up what these name, and nothing else.
-constexpr const char* kOutputs[] = {"--out",      "--json", "--outputs",    "--capture",      "--report",
-                                    "--pictures", "--onnx", "--board-link", "--printer-link", "--c99"};
+constexpr const char* kOutputs[] = {"--out",          "--json",     "--outputs", "--capture",
+                                    "--report",       "--pictures", "--onnx",    "--board-link",
+                                    "--printer-link", "--mcap",     "--c99"};
 // What no program may change.
 constexpr const char* kKept[] = {"precious", "precious.stl", "model", "data/good"};
 

@@ -206,7 +206,7 @@ TEST_F(Streaming, NothingIsOverwrittenWithoutForce) {
   write_file(path("capture"), "mine");
   expect_failure(stream("--board " + board() + " --capture capture"), 1, "--force");
   const auto recording = read_text_file(path("recording"), 1 << 26);
-  EXPECT_NE(stream("--recording recording --out recording --force").code, 0);
+  EXPECT_NE(stream("--recording recording --mcap recording --force").code, 0);
   EXPECT_EQ(read_text_file(path("recording"), 1 << 26), recording);
 }
 
@@ -215,6 +215,10 @@ TEST_F(Streaming, WithoutAPictureNothingIsReplaced) {
   write_file(path("out"), "mine");
   expect_failure(stream("--recording recording --out out --force --seconds 0.01"), 1, "no picture");
   EXPECT_EQ(read_text_file(path("out"), 10), "mine");
+  expect_failure(stream("--recording recording --mcap out --out none --force --seconds 0.01"), 1,
+                 "no picture");
+  EXPECT_EQ(read_text_file(path("out"), 10), "mine");
+  EXPECT_FALSE(fs::exists(path("none")));
 }
 
 TEST_F(Streaming, DrawsOnATerminalOnly) {

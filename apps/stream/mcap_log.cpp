@@ -1,0 +1,152 @@
+#include "apps/stream/mcap_log.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace supertac {
+namespace {
+
+// The definitions of ROS 2's common interfaces, without their comments.
+constexpr char kImage[] = R"(std_msgs/Header header
+uint32 height
+uint32 width
+string encoding
+uint8 is_bigendian
+uint32 step
+uint8[] data
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+)";
+constexpr char kArray[] = R"(std_msgs/MultiArrayLayout layout
+float32[] data
+================================================================================
+MSG: std_msgs/MultiArrayLayout
+std_msgs/MultiArrayDimension[] dim
+uint32 data_offset
+================================================================================
+MSG: std_msgs/MultiArrayDimension
+string label
+uint32 size
+uint32 stride
+)";
+
+// A message as ROS 2 sends it, little-endian: numbers of four bytes are aligned to four.
+class Cdr {
+ public:
+  Cdr& number(std::size_t value) {
+    const auto word = static_cast<std::uint32_t>(value);
+    text_.resize((text_.size() + 3) / 4 * 4);
+    text_.append(reinterpret_cast<const char*>(&word), sizeof word);
+    return *this;
+  }
+  Cdr& byte(char value) {
+    text_ += value;
+    return *this;
+  }
+  Cdr& text(const std::string& value) {
+    number(value.size() + 1);
+    text_.append(value).push_back('\0');
+    return *this;
+  }
+  // Of floats: a sequence of `count` elements, which may be their bytes.
+  Cdr& sequence(std::span<const float> values, std::size_t count) {
+    number(count);
+    text_.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
+    return *this;
+  }
+  const std::string& message() const { return text_; }
+
+ private:
+  std::string text_{"\0\1\0\0", 4};
+};
+
+std::uint64_t nanoseconds(double seconds) {
+  return static_cast<std::uint64_t>(std::clamp(std::round(1e9 * seconds), 0.0, 9e18));
+}
+
+std::string image_message(std::uint64_t stamp, int height, int width, int channels,
+                          std::span<const float> values) {
+  constexpr std::uint64_t kSecond = 1'000'000'000;
+  const std::string encoding = "32FC" + std::to_string(channels);
+  const std::size_t step = values.size_bytes() / static_cast<std::size_t>(height);
+  return Cdr()
+      .number(stamp / kSecond)
+      .number(stamp % kSecond)
+      .text("supertac")  // the frame of coordinates
+      .number(static_cast<std::size_t>(height))
+      .number(static_cast<std::size_t>(width))
+      .text(encoding)
+      .byte(0)
+      .number(step)
+      .sequence(values, values.size_bytes())
+      .message();
+}
+
+std::string taxels_message(const TaxelArray& array, std::span<const float> signals) {
+  Cdr cdr;
+  cdr.number(3);
+  std::size_t stride = array.signals();
+  const auto axis = [&](const char* label, int count) {
+    const auto size = static_cast<std::size_t>(count);
+    cdr.text(label).number(size).number(stride);
+    stride /= size;
+  };
+  axis("rows", array.rows), axis("columns", array.columns), axis("channels", array.channels);
+  return cdr.number(0).sequence(signals, signals.size()).message();
+}
+
+std::vector<McapChannel> channels_of(const TaxelArray& array, const std::string& unit, const ImageGrid& image,
+                                     bool half_widths) {
+  const bool drawn = image.pixels() > 0;
+  const auto channel = [&](const char* name, bool picture, const std::string& of) {
+    return McapChannel{std::string("/supertac/") + name,
+                       picture ? "sensor_msgs/msg/Image" : "std_msgs/msg/Float32MultiArray",
+                       picture ? kImage : kArray,
+                       {{"unit", of},
+                        {"array", array.text()},
+                        {"pixel_mm", (picture && drawn ? image.pixel_mm : array.pitch_mm).text()}}};
+  };
+  const std::string heights = "1: the highest of the truth";
+  std::vector<McapChannel> channels = {channel("taxels", false, unit),
+                                       channel("picture", true, drawn ? heights : unit)};
+  const std::string loads = "1: a taxel at the end of its range";
+  channels.push_back({"/supertac/total_force", "std_msgs/msg/Float32", "float32 data\n", {{"unit", loads}}});
+  channels.push_back({"/supertac/saturated", "std_msgs/msg/UInt32", "uint32 data\n", {{"unit", "signals"}}});
+  if (half_widths) channels.push_back(channel("half_width", true, heights));
+  return channels;
+}
+
+}  // namespace
+
+McapLog::McapLog(const OutputPath& output, const TaxelArray& array, const SignalScale& scale,
+                 const ImageGrid& image, bool half_widths)
+    : array_(array),
+      scale_(scale),
+      image_(image),
+      file_(output, channels_of(array, scale.unit, image, half_widths)) {}
+
+void McapLog::add(double time_s, double wall_s, std::span<const float> signals,
+                  std::span<const float> picture, std::span<const float> half_widths) {
+  const std::uint64_t published = nanoseconds(time_s),
+                      logged = std::isnan(wall_s) ? published : nanoseconds(wall_s);
+  file_.add(0, logged, published, taxels_message(array_, signals));
+  file_.add(1, logged, published,
+            image_.pixels() > 0
+                ? image_message(logged, image_.height, image_.width, 1, picture)
+                : image_message(logged, array_.rows, array_.columns, array_.channels, signals));
+  const FrameLoad load = load_of(signals, array_.channels, scale_);
+  file_.add(2, logged, published,
+            Cdr().number(std::bit_cast<std::uint32_t>(static_cast<float>(load.total_force))).message());
+  file_.add(3, logged, published, Cdr().number(load.saturated).message());
+  if (!half_widths.empty())
+    file_.add(4, logged, published, image_message(logged, image_.height, image_.width, 1, half_widths));
+}
+
+}  // namespace supertac

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <string>
+
+#include "data/sensors/frame_load.h"
+#include "io/files/mcap_file.h"
+
+namespace supertac {
+
+/// Frames and pictures as messages of ROS 2 in an MCAP file:
+///   /supertac/taxels      std_msgs/msg/Float32MultiArray [rows][columns][channels], in the sensor's unit
+///   /supertac/total_force std_msgs/msg/Float32, and
+///   /supertac/saturated   std_msgs/msg/UInt32, as FrameLoad has them
+///   /supertac/picture     sensor_msgs/msg/Image, 32FC1 [height][width]; without pictures the array itself,
+///                         32FC<channels> [rows][columns]
+///   /supertac/half_width  the same, of each pixel's 90 % interval, where the model says how sure it is
+/// Pictures are stamped, and all messages logged, with the wall-clock time of the frame, and
+/// published with the sensor's. Metadata of a channel name the unit, the array, and the size of a pixel in
+/// mm.
+class McapLog {
+ public:
+  /// `image` without pixels: there are no pictures. `half_widths`: whether add() gets any. Throws FileError.
+  McapLog(const OutputPath& output, const TaxelArray& array, const SignalScale& scale, const ImageGrid& image,
+          bool half_widths);
+  /// `time_s` >= 0, of the sensor; `wall_s` since 1970, NaN where it is not known: the sensor's then stands
+  /// for it. Throws FileError.
+  void add(double time_s, double wall_s, std::span<const float> signals, std::span<const float> picture,
+           std::span<const float> half_widths);
+  /// Throws FileError, again when add() has.
+  void close() { file_.close(); }
+
+ private:
+  TaxelArray array_;
+  SignalScale scale_;
+  ImageGrid image_;
+  McapFile file_;
+};
+
+}  // namespace supertac
