@@ -92,9 +92,10 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
     for (std::size_t m = 0; m < d.pictures.size(); ++m)
       scores.of_method[m].add(d.pictures[m], d.target, zone, windows.contact_level());
     scores.by_group.add(d.example, d.pictures[0], d.target);
-    scores.trust.add(d);
     scores.map.add(d);
-    if (const auto one = contact_score(windows, d.example, d.pictures[0], d.target)) {
+    const auto one = contact_score(windows, d.example, d.pictures[0], d.target);
+    scores.trust.add(d, one);
+    if (one) {
       scores.by_distance.add(*one);
       scores.by_pass.add(*one);
       if (page != nullptr) page->add(d, one->ssim);

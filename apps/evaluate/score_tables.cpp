@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "io/numbers/numbers.h"
 #include "models/inference/novelty.h"
@@ -133,7 +134,7 @@ nlohmann::ordered_json GroupScores::to_json() const {
 }
 
 std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result, const GroupScores& groups) {
-  constexpr double kHardly = 0.02;
+  constexpr double kHardly = 0.02, kCoin = 0.5;
   constexpr std::size_t kFew = 3;
   std::vector<std::string> remarks;
   const auto ssim_of = [](const nlohmann::ordered_json& scores) {
@@ -147,6 +148,9 @@ std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result,
       remarks.push_back("the network's contact SSIM, " + format(own, 3) +
                         ", is hardly above that of ridge regression, " + format(ridge, 3) +
                         ": more or other recordings, or longer training, would have to help");
+  if (const auto& auroc = result["trust"]["auroc"]; auroc.is_number() && auroc.get<double>() < kCoin)
+    remarks.push_back("predicted errors tell less than a coin which pictures are bad (AUROC " +
+                      format(auroc.get<double>(), 3) + "): do not rely on them here");
   if (groups.by_group() && groups.size() < kFew)
     remarks.push_back(std::to_string(groups.size()) + (groups.size() == 1 ? " group was" : " groups were") +
                       " tested: others may be drawn much better or worse; --split group --leave-out NAME of "
@@ -154,7 +158,7 @@ std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result,
   return remarks;
 }
 
-void TrustScores::add(const Drawn& drawn) {
+void TrustScores::add(const Drawn& drawn, const std::optional<ContactScore>& contact) {
   const std::span<const float> predicted_error = drawn.predicted_error;
   if (model_.novelty) {
     ++judged_;
@@ -163,6 +167,18 @@ void TrustScores::add(const Drawn& drawn) {
   if (!predicted_error.empty())
     coverage_.add(windows_.pass_of(drawn.example), drawn.pictures[0], windows_.image().width, drawn.target,
                   predicted_error);
+  if (contact && !predicted_error.empty())
+    told_.emplace_back(std::accumulate(predicted_error.begin(), predicted_error.end(), 0.0),
+                       contact->ssim < kBadSsim);
+}
+
+double TrustScores::auroc() const {
+  std::vector<std::pair<double, bool>> sorted = told_;
+  std::ranges::sort(sorted);
+  double right = 0, good = 0;  // pairs in the right order, and good pictures so far
+  for (const auto& [error, bad] : sorted) bad ? right += good : good += 1;
+  const double pairs = good * (static_cast<double>(sorted.size()) - good);
+  return pairs > 0 ? right / pairs : std::nan("");
 }
 
 std::vector<std::pair<std::string, IntervalCoverage::Held>> TrustScores::classes() const {
@@ -186,6 +202,9 @@ std::vector<std::string> TrustScores::lines() const {
     truths += (truths.empty() ? "" : ", ") + name + " " + percent(held.share) + " (+-" +
               format(held.half_width, 2) + ")";
   if (!truths.empty()) lines.push_back("intervals hold by height of the truth: " + truths);
+  if (const double told = auroc(); std::isfinite(told))
+    lines.push_back("predicted errors tell an SSIM below " + format(kBadSsim) + " with an AUROC of " +
+                    format(told, 3));
   if (judged_ > 0)
     lines.push_back(percent(static_cast<double>(unlike_) / static_cast<double>(judged_)) +
                     " of the windows are unlike training");
@@ -203,6 +222,7 @@ nlohmann::ordered_json TrustScores::to_json() const {
       json["coverage_of"]["true " + name] = {
           {"share", number(held.share)}, {"half_width", number(held.half_width)}, {"pixels", held.pixels}};
   }
+  json["auroc"] = number(auroc());
   if (judged_ > 0) json["unlike_training"] = static_cast<double>(unlike_) / static_cast<double>(judged_);
   return json;
 }

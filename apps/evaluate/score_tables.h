@@ -103,7 +103,7 @@ class GroupScores {
 };
 
 /// What a reader of the scores should know: `result` is the evaluation's JSON. That a network is hardly above
-/// ridge regression, that few groups were tested.
+/// ridge regression, that predicted errors do not tell bad pictures, that few groups were tested.
 std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result, const GroupScores& groups);
 
 /// Whether a network knows when its picture is a guess: what it says of its own pictures against what is
@@ -114,21 +114,26 @@ class TrustScores {
   TrustScores(const WindowSet& windows, const ModelFile& model)
       : windows_(windows), model_(model), coverage_(model.interval()) {}
   /// Windows of a pass come in the order of time. Without a predicted error nothing is counted of it.
-  void add(const Drawn& drawn);
+  void add(const Drawn& drawn, const std::optional<ContactScore>& contact);
 
   /// For people: nothing for a model that says nothing of its pictures.
   std::vector<std::string> lines() const;
   /// {"interval", "coverage", "interval_found", "coverage_of": {"true 0": {"share", "half_width", "pixels"},
-  /// "true to 0.2", "true to 0.5", "true above 0.5"}, "unlike_training"}
+  /// "true to 0.2", "true to 0.5", "true above 0.5"}, "auroc", "unlike_training"}
   nlohmann::ordered_json to_json() const;
 
  private:
   /// By how high the truth is, in words; without those that no pixel belongs to.
   std::vector<std::pair<std::string, IntervalCoverage::Held>> classes() const;
+  /// How often, of a contact window with an SSIM below kBadSsim and one above, the first has the larger mean
+  /// predicted error (Hanley, McNeil 1982); NaN without such a pair.
+  double auroc() const;
+  static constexpr double kBadSsim = 0.8;
 
   const WindowSet& windows_;
   const ModelFile& model_;
   IntervalCoverage coverage_;
+  std::vector<std::pair<double, bool>> told_;  // of contact windows: sum of predicted errors, a bad picture
   std::uint64_t judged_ = 0, unlike_ = 0;
 };
 

@@ -3,9 +3,11 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <numeric>
 #include <regex>
 
 #include "data/recordings/recording.h"
+#include "data/scores/metrics.h"
 #include "io/files/json.h"
 #include "io/files/provenance.h"
 #include "io/files/safetensors.h"
@@ -180,12 +182,34 @@ TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   }
   for (const char* part : {"flat", "air"}) EXPECT_TRUE(json[part].contains("ghost_rate")) << part;
   EXPECT_TRUE(json["contact"].contains("miss_rate"));
-  for (const char* key : {"interval", "coverage", "interval_found", "coverage_of", "unlike_training"})
+  for (const char* key :
+       {"interval", "coverage", "interval_found", "coverage_of", "auroc", "unlike_training"})
     EXPECT_TRUE(json["trust"].contains(key)) << key;
   const SafetensorsFile outputs = SafetensorsFile::read(path("outputs.safetensors"));
   EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<std::uint64_t>{40, 32, 16}));
   EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{40, 8, 8}));
   EXPECT_EQ(outputs.tensors().at("predicted_error").shape, (std::vector<std::uint64_t>{40, 8, 8}));
+  const std::vector<float> drawn = outputs.f32("output"), truths = outputs.f32("truth"),
+                           predicted = outputs.f32("predicted_error");
+  double pairs = 0, told = 0;  // of a bad picture and a good one
+  const auto window_of = [](const std::vector<float>& all, std::size_t n) {
+    return std::span(all).subspan(64 * n, 64);
+  };
+  const auto touches = [&](std::size_t n) {
+    return std::ranges::any_of(window_of(truths, n), [](float v) { return v != 0; });
+  };
+  const auto bad = [&](std::size_t n) { return ssim(window_of(drawn, n), window_of(truths, n), 8, 8) < 0.8; };
+  const auto sum = [&](std::size_t n) {
+    const auto e = window_of(predicted, n);
+    return std::accumulate(e.begin(), e.end(), 0.0);
+  };
+  for (std::size_t a = 0; a < 40; ++a)
+    for (std::size_t b = 0; b < 40; ++b)
+      if (touches(a) && touches(b) && bad(a) && !bad(b)) pairs += 1, told += sum(a) > sum(b) ? 1 : 0;
+  EXPECT_EQ(json["trust"]["auroc"].is_number(), pairs > 0);
+  if (pairs > 0) {
+    EXPECT_NEAR(json["trust"]["auroc"].get<double>(), told / pairs, 1e-9);
+  }
   EXPECT_EQ(outputs.tensors().at("position_mm").shape, (std::vector<std::uint64_t>{40, 2}));
   EXPECT_EQ(outputs.tensors().at("pass").dtype, "I64");
   EXPECT_TRUE(fs::exists(path("pictures/strips.png")));
