@@ -16,9 +16,9 @@ using Json = nlohmann::ordered_json;
 
 void declare(Arguments&) {}
 
-static std::string short_text(double value) {
+static std::string digits(double value, int count) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
+  std::snprintf(text, sizeof text, "%.*g", count, value);
   return text;
 }
 
@@ -40,17 +40,20 @@ int run(Arguments& a) {
     Json row = {{"kind", c->kind}, {"name", c->name}};
     Dim entries = 0;
     GradientEntry worst{};
+    std::vector<std::string> reports;  // of cases with wrong entries, ten entries each
     for (const std::string& name = row["name"].get_ref<std::string&>(); c != cases.end() && c->name == name;
          progress.update(static_cast<std::uint64_t>(++c - cases.begin()))) {
       stop_if_interrupted();
       const GradientReport report = check_gradients(c->f, c->leaves, c->options);
       if (entries == 0 || report.max_relative_error > worst.relative_error) worst = report.worst.front();
+      if (report.wrong > 0) reports.push_back(report.text());
       entries += report.entries;
     }
     const bool is_wrong = !(worst.relative_error <= kGradientTolerance);
-    print_row(a, row["kind"], row["name"], std::to_string(entries), short_text(worst.relative_error),
-              (is_wrong ? "WRONG  " : "ok     ") + worst.place + ": analytic " + short_text(worst.analytic) +
-                  ", numeric " + short_text(worst.numeric));
+    print_row(a, row["kind"], row["name"], std::to_string(entries), digits(worst.relative_error, 3),
+              (is_wrong ? "WRONG  " : "ok     ") + worst.place + ": analytic " + digits(worst.analytic, 10) +
+                  ", numeric " + digits(worst.numeric, 10));
+    for (const std::string& report : reports) a.print(report);
     row.update({{"entries", entries},
                 {"wrong", is_wrong},
                 {"worst",

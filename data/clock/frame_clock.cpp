@@ -13,8 +13,7 @@ using namespace clock_model;
 ClockSettings clock_settings(const Sensor& sensor, bool stored) {
   ClockSettings settings{
       .period_s = 1 / sensor.rate_hz,
-      .tolerance = sensor.frame.kind == FrameKind::board ? 0.005 : 20,  // of a rate that is a word
-
+      .tolerance = sensor.frame.kind == FrameKind::board ? 0.005 : 20,  // a stated rate may be 21 times off
       .stored = stored};
   if (sensor.frame.kind == FrameKind::board) settings.period_s = rig::kFramePeriodS;
   if (!sensor.frame.time) return settings;

@@ -129,23 +129,23 @@ class WindowSet {
   void window(std::size_t i, std::span<float> out) const;
   /// The window, not normalised.
   std::vector<float> window(std::size_t i) const;
-  /// Of the frame that it shows, the last, or where that is delayed an earlier one, [height][width] of
-  /// image(): as measured, or truth_image; 0 in the air.
+  /// Writes the truth [height][width] of image() of the frame that the window shows: of its last frame, or of
+  /// an earlier one where pictures are delayed. It is the measured one or truth_image(), and 0 in the air.
   void truth(std::size_t i, std::span<float> out) const;
-  /// That frame, [signals].
+  /// The signals of that frame.
   std::vector<float> shown_frame(std::size_t i) const;
   /// The finger's centre on the plate in that frame; NaN where it is unknown.
   Position position(std::size_t i) const;
   /// "x 18.0, y 43.5 mm", or where that is unknown "frame 17".
   std::string place_text(std::size_t i) const;
-  /// What is scored together. By its measured truth alone a window is in contact, beyond contact_level(), or
-  /// flat.
+  /// Windows of one zone are scored together. Where the truth was measured, a window is in contact if it goes
+  /// beyond contact_level(), else flat.
   Zone zone(std::size_t i) const;
   bool augmentable(std::size_t i) const { return passes_[pass_of(i)].use.augmentable; }
   bool in_distribution(std::size_t i) const { return passes_[pass_of(i)].use.in_distribution; }
   bool contact(std::size_t i) const { return zone(i) == Zone::contact; }
-  /// Of measured truths: as the settings say, or the median of the recordings'; nothing where none was
-  /// measured.
+  /// The level of a measured truth beyond which it is contact: that of the settings, or the median of the
+  /// recordings'; nothing where no truth was measured.
   std::optional<float> contact_level() const;
   std::size_t pass_of(std::size_t i) const { return place_of(i).pass; }
   /// Number of the last frame within its pass.

@@ -34,7 +34,7 @@ struct PixelInterval {
   /// neighbours.
   void half_widths(std::span<const float> picture, std::int64_t width, std::span<const float> predicted_error,
                    std::vector<float>& widths) const;
-  /// The same of one pixel, and without a most.
+  /// w of one pixel, before it is cut at 1.
   float reach(std::span<const float> picture, std::int64_t width, std::size_t pixel,
               float predicted_error) const;
 
