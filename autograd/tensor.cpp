@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <new>
-#include <stdexcept>
 #include <utility>
 
 #include "autograd/kernels/fast/pool.h"
+#include "autograd/record.h"
 
 namespace supertac {
 
@@ -17,15 +17,12 @@ constexpr std::size_t kHeader = 64;  // the buffer's header; the values start on
 Shape::Shape(std::initializer_list<Dim> dims) : Shape(std::span<const Dim>(dims.begin(), dims.size())) {}
 
 Shape::Shape(std::span<const Dim> dims) {
-  if (dims.size() > kMaxRank) {
-    throw std::invalid_argument("Shape: at most 4 dimensions, got " + std::to_string(dims.size()));
-  }
+  if (dims.size() > kMaxRank) refuse("Shape", "dims", "at most 4", std::to_string(dims.size()));
   Dim elements = 1;
   for (const Dim dim : dims) {
-    if (dim < 0 || (dim > 0 && elements > kMaxElements / dim)) {
-      throw std::invalid_argument("Shape: dimension " + std::to_string(dim) +
-                                  " is negative, or all together are above 2^40");
-    }
+    if (dim < 0 || (dim > 0 && elements > kMaxElements / dim))
+      refuse("Shape", "dimension " + std::to_string(rank_), "0 or more, and a product of 2^40 or less",
+             std::to_string(dim));
     elements *= dim;
     dims_[static_cast<std::size_t>(rank_++)] = dim;
   }
@@ -58,10 +55,9 @@ Tensor Tensor::full(const Shape& shape, real value) {
 
 Tensor Tensor::of(const Shape& shape, std::span<const real> values) {
   Tensor t(shape);
-  if (static_cast<Dim>(values.size()) != t.size()) {
-    throw std::invalid_argument("Tensor::of: shape " + shape.text() + " holds " + std::to_string(t.size()) +
-                                " values, got " + std::to_string(values.size()));
-  }
+  if (static_cast<Dim>(values.size()) != t.size())
+    refuse("Tensor::of", "values", std::to_string(t.size()) + " numbers for " + shape.text(),
+           std::to_string(values.size()));
   std::copy(values.begin(), values.end(), t.data());
   return t;
 }
@@ -100,7 +96,7 @@ Tensor Tensor::clone() const {
 void Tensor::fill(real value) { std::fill_n(values_, size_, value); }
 
 real Tensor::item() const {
-  if (size_ != 1) throw std::invalid_argument("item: expected one element, shape is " + shape_.text());
+  if (size_ != 1) refuse("item", "the tensor", "one element", shape_.text());
   return values_[0];
 }
 

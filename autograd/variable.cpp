@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "autograd/kernels/fast/pool.h"
+#include "autograd/record.h"
 
 namespace supertac {
 
@@ -62,7 +63,7 @@ void release(Node* node) noexcept {
 using detail::Node;
 
 Variable::Variable(Tensor value, bool requires_grad) {
-  if (!value.defined()) throw std::invalid_argument("Variable: the tensor is undefined");
+  if (!value.defined()) refuse("Variable", "value", "a tensor", "an undefined one");
   node_ = detail::new_node();
   node_->value = std::move(value);
   node_->requires_grad = requires_grad;

@@ -153,7 +153,7 @@ TEST(Variable, RefusesToBeUsedWithoutAValue) {
   expect_refusal("scale: x expects a value, got an empty Variable", [&] { 2 * empty; });
   expect_refusal("add: b expects a value, got an empty Variable",
                  [&] { parameter(Tensor::zeros({1})) + empty; });
-  expect_refusal("Variable: the tensor is undefined", [] { parameter(Tensor()); });
+  expect_refusal("Variable: value expects a tensor, got an undefined one", [] { parameter(Tensor()); });
   EXPECT_STREQ(Variable().op(), "none");
   EXPECT_STREQ(parameter(Tensor::zeros({1})).op(), "leaf");
 }
