@@ -119,8 +119,8 @@ Column column_of(const unsigned char* first, std::size_t stride, std::size_t ste
     before = levels[high] = now, high_before = high;
   }
   column.steps = bits_of_steps(counts, steps), column.still = counts[0] == steps;
-  // Saturation and glitches of unsigned bytes are jumps between two levels, and back; read as signed they
-  // would look like small steps across 0.
+  // Saturation and glitches of bytes are jumps between two levels, and back. With a sign they may look like
+  // small steps across 0 as well, so both readings have both explanations.
   if (two_levels && column.high)
     column.steps = std::min(column.steps,
                             static_cast<double>(kBits) + bits_of_share(turns[0][0], turns[0][1]) +
@@ -192,7 +192,7 @@ void BinaryColumns::find_values() {
       return column;
     }
     return type == "u8"    ? column_of<std::uint8_t>(first, period, steps_, big, ordinal<std::uint8_t>, true)
-           : type == "i8"  ? column_of<std::uint8_t>(first, period, steps_, big, ordinal<std::int8_t>)
+           : type == "i8"  ? column_of<std::uint8_t>(first, period, steps_, big, ordinal<std::int8_t>, true)
            : type == "u16" ? column_of<std::uint16_t>(first, period, steps_, big, ordinal<std::uint16_t>)
            : type == "i16" ? column_of<std::uint16_t>(first, period, steps_, big, ordinal<std::int16_t>)
            : type == "u32" ? column_of<std::uint32_t>(first, period, steps_, big, ordinal<std::uint32_t>)
