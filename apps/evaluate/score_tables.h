@@ -134,6 +134,7 @@ class TrustScores {
   const ModelFile& model_;
   IntervalCoverage coverage_;
   std::vector<std::pair<double, bool>> told_;  // of contact windows: sum of predicted errors, a bad picture
+  std::vector<float> errors_;
   std::uint64_t judged_ = 0, unlike_ = 0;
 };
 

@@ -95,7 +95,8 @@ std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& wi
                       .drawn = {drawn.begin(), drawn.end()},
                       .truth = {truth.begin(), truth.end()},
                       .half_widths = {}};
-      interval.half_widths(drawn, windows.image().width, b.predicted_error(n), one.half_widths);
+      interval.with_load(network.first().format(), b.input(n), b.predicted_error(n), one.half_widths);
+      interval.half_widths(drawn, windows.image().width, one.half_widths, one.half_widths);
       shown.push_back(std::move(one));
     }
     return true;

@@ -72,9 +72,11 @@ void PictureMaker::rezero(std::span<const double> resting) {
 std::span<const float> PictureMaker::picture() {
   if (!window_.window(input_.values())) return {};
   output_ = network_.estimate(input_);
-  if (output_.predicted_error.defined())
-    interval_.half_widths(output_.picture.values(), image().width, output_.predicted_error.values(),
-                          half_widths_);
+  if (output_.predicted_error.defined()) {
+    interval_.with_load(network_.first().format(), input_.values(), output_.predicted_error.values(),
+                        half_widths_);
+    interval_.half_widths(output_.picture.values(), image().width, half_widths_, half_widths_);
+  }
   if (model_.novelty) {
     signal_features(input_.values(), model_.array(), features_);
     distance_ = model_.novelty->distance(features_);

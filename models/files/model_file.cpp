@@ -224,7 +224,7 @@ CompiledModel compiled(const ModelFile& file, Precision precision) {
 Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision) {
   std::vector<CompiledModel> members;
   for (const ModelFile& file : files) members.push_back(compiled(file, precision));
-  return Ensemble(std::move(members), files.front().interval().load);
+  return Ensemble(std::move(members));
 }
 
 void save_model(const std::string& path, const SuperTac& model, const InputSettings& input,

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "autograd/kernels/fast/pool.h"
-#include "models/inference/interval.h"
 
 namespace supertac {
 
@@ -19,8 +18,7 @@ std::string text(const NetworkFormat& f) {
 
 static double square(real x) { return static_cast<double>(x) * static_cast<double>(x); }
 
-Ensemble::Ensemble(std::vector<CompiledModel> members, double load)
-    : members_(std::move(members)), load_(load) {
+Ensemble::Ensemble(std::vector<CompiledModel> members) : members_(std::move(members)) {
   if (members_.empty()) throw std::invalid_argument("Ensemble: expected at least one network, got none");
   for (const CompiledModel& member : members_)
     if (member.network().format() != first().format())
@@ -29,12 +27,6 @@ Ensemble::Ensemble(std::vector<CompiledModel> members, double load)
 }
 
 Estimate Ensemble::estimate(const Tensor& inputs) const {
-  Estimate drawn = mean_of(inputs);
-  if (load_ > 0) add_load(load_, first().format(), inputs.values(), drawn.predicted_error.values());
-  return drawn;
-}
-
-Estimate Ensemble::mean_of(const Tensor& inputs) const {
   Estimate mean = members_.front().estimate(inputs);
   if (members_.size() == 1) return mean;
   const bool predicted_error = mean.predicted_error.defined();

@@ -16,21 +16,18 @@ std::string text(const NetworkFormat& format);
 class Ensemble {
  public:
   /// Throws std::invalid_argument when there is none, or when they differ in the inputs that they take or in
-  /// the pictures that they draw. `load`: add_load() (interval.h) of it to each predicted error.
-  explicit Ensemble(std::vector<CompiledModel> members, double load = 0);
+  /// the pictures that they draw.
+  explicit Ensemble(std::vector<CompiledModel> members);
 
   const SuperTac& first() const { return members_.front().network(); }
   /// The members' pictures are added in their order. predicted_error^2 is the mean of their predicted_error^2
-  /// plus the variance of their pictures and the load's, the latents are those of the first. Throws as
+  /// plus the variance of their pictures, the latents are those of the first. Throws as
   /// SuperTac::estimate, and std::invalid_argument when some predict their error and others do not.
   Estimate estimate(const Tensor& inputs) const;
   Tensor infer(const Tensor& inputs) const { return estimate(inputs).picture; }
 
  private:
-  Estimate mean_of(const Tensor& inputs) const;
-
   std::vector<CompiledModel> members_;
-  double load_;
 };
 
 }  // namespace supertac

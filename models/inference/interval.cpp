@@ -51,18 +51,19 @@ std::optional<PixelInterval> PixelInterval::read(const std::string& text) {
   return PixelInterval{*shift, *factor, *load};
 }
 
-void add_load(double load, const NetworkFormat& format, std::span<const float> inputs,
-              std::span<float> predicted_errors) {
+void PixelInterval::with_load(const NetworkFormat& format, std::span<const float> input,
+                              std::span<const float> predicted_error, std::vector<float>& errors) const {
+  errors.assign(predicted_error.begin(), predicted_error.end());
+  if (load == 0) return;
   const auto columns = static_cast<std::size_t>(format.columns),
              scale = static_cast<std::size_t>(format.scale),
              channels = static_cast<std::size_t>(format.channels), width = columns * scale,
-             taxels = static_cast<std::size_t>(format.rows) * columns, pixels = taxels * scale * scale,
-             window = static_cast<std::size_t>(format.frames) * taxels * channels;
+             frame = static_cast<std::size_t>(format.rows) * columns * channels;
+  const auto last = input.last(frame);
   const auto share = static_cast<float>(load / static_cast<double>(channels));
-  for (std::size_t i = 0; i < predicted_errors.size(); ++i) {
-    const std::size_t pixel = i % pixels, taxel = pixel / width / scale * columns + pixel % width / scale;
-    const auto last = inputs.subspan((i / pixels + 1) * window - taxels * channels);
-    for (const float signal : last.subspan(taxel * channels, channels)) predicted_errors[i] += share * signal;
+  for (std::size_t pixel = 0; pixel < errors.size(); ++pixel) {
+    const std::size_t taxel = pixel / width / scale * columns + pixel % width / scale;
+    for (const float signal : last.subspan(taxel * channels, channels)) errors[pixel] += share * signal;
   }
 }
 

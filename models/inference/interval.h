@@ -22,7 +22,7 @@ inline float at_least(float predicted_error) { return std::max(predicted_error, 
 /// surface, and be wrong besides; a network can predict the latter only:
 ///   w = shift max |v' - v| + factor at_least(predicted error), 1 at most,    v': the eight pixels around
 /// the first term being, to first order, what a picture `shift` pixels off changes. A predicted error is the
-/// network's and, where `load` is not 0, what add_load() adds.
+/// network's, or where `load` is not 0 that of with_load().
 struct PixelInterval {
   /// By default the least shift (in steps of 1/4) and then the least factor (of .05) that hold 90 % in each
   /// class of truths of IntervalCoverage on passes held out of trial 1: four plates, preset paper, split
@@ -34,6 +34,12 @@ struct PixelInterval {
   /// neighbours.
   void half_widths(std::span<const float> picture, std::int64_t width, std::span<const float> predicted_error,
                    std::vector<float>& widths) const;
+  /// A taxel tells the mean of what lies under it, so a pixel there may be up to scale^2 times as high; a
+  /// network that has never felt such an object does not know this of itself. Into `errors`, no heap once
+  /// that is large: the predicted errors [rows scale][columns scale] of `input`, plus of each pixel `load`
+  /// times the signal of its taxel, the mean of its channels in the last frame.
+  void with_load(const NetworkFormat& format, std::span<const float> input,
+                 std::span<const float> predicted_error, std::vector<float>& errors) const;
   /// w of one pixel, before it is cut at 1.
   float reach(std::span<const float> picture, std::int64_t width, std::size_t pixel,
               float predicted_error) const;
@@ -45,13 +51,6 @@ struct PixelInterval {
   static std::optional<PixelInterval> read(const std::string& text);
   bool operator==(const PixelInterval&) const = default;
 };
-
-/// A taxel tells the mean of what lies under it, so a pixel there may be up to scale^2 times as high; a
-/// network that has never felt such an object does not know this of itself. Adds to the predicted errors of n
-/// inputs, [n][rows scale][columns scale], of each pixel `load` times the signal of its taxel: of the last
-/// frame, and of its channels the mean.
-void add_load(double load, const NetworkFormat& format, std::span<const float> inputs,
-              std::span<float> predicted_errors);
 
 /// How many pixels' truths lie within picture +- half width, by how high the truth is: most pixels are empty,
 /// so a share of all is a figure about emptiness. Passes are the unit, each counts the same: windows of one

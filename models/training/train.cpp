@@ -112,13 +112,16 @@ std::map<std::string, std::string> trained_origin(const Trainer& trainer, const 
   const double most = static_cast<double>(task.windows->scale()) * static_cast<double>(task.windows->scale());
   const auto judged = [&](const PixelInterval& interval) {
     IntervalCoverage coverage(interval);
-    for_each_output(Ensemble({CompiledModel(trainer.model())}, interval.load), *task.windows, tested,
-                    [&](const EvaluatedBatch& b) {
-                      for (std::size_t n = 0; n < b.size(); ++n)
-                        coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n),
-                                     task.windows->image().width, b.target(n), b.predicted_error(n));
-                      return true;
-                    });
+    std::vector<float> errors;
+    for_each_output(
+        Ensemble({CompiledModel(trainer.model())}), *task.windows, tested, [&](const EvaluatedBatch& b) {
+          for (std::size_t n = 0; n < b.size(); ++n) {
+            interval.with_load(trainer.model().format(), b.input(n), b.predicted_error(n), errors);
+            coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n), task.windows->image().width,
+                         b.target(n), errors);
+          }
+          return true;
+        });
     return coverage;
   };
   const PixelInterval plain = judged({}).found(), loaded = judged({.load = most}).found();

@@ -49,15 +49,15 @@ TEST(PixelInterval, IsReadAsItIsWritten) {
     EXPECT_FALSE(PixelInterval::read(wrong)) << wrong;
 }
 
-// Two windows of two frames of 1x2 taxels with two channels, pictures of 2x4: the last frames count.
+// A window of two frames of 1x2 taxels with two channels, a picture of 2x4: the last frame counts.
 TEST(PixelInterval, ALoadIsThatOfThePixelsTaxel) {
   const NetworkFormat format{.frames = 2, .rows = 1, .columns = 2, .channels = 2, .scale = 2};
-  const std::vector<float> windows = {9, 9, 9, 9, 1, 3, 0, 0, 9, 9, 9, 9, 0, 0, 0, 5};
-  std::vector<float> errors(16, 0.5F);
-  add_load(2, format, windows, errors);
-  const std::vector<float> expected = {4.5F, 4.5F, 0.5F, 0.5F, 4.5F, 4.5F, 0.5F, 0.5F,
-                                       0.5F, 0.5F, 5.5F, 5.5F, 0.5F, 0.5F, 5.5F, 5.5F};
-  EXPECT_EQ(errors, expected);
+  const std::vector<float> window = {9, 9, 9, 9, 1, 3, 0, 5}, predicted(8, 0.5F);
+  std::vector<float> errors;
+  PixelInterval{.load = 2}.with_load(format, window, predicted, errors);
+  EXPECT_EQ(errors, (std::vector<float>{4.5F, 4.5F, 5.5F, 5.5F, 4.5F, 4.5F, 5.5F, 5.5F}));
+  PixelInterval{}.with_load(format, window, predicted, errors);
+  EXPECT_EQ(errors, predicted);
 }
 
 // Errors of 0.1, 0.2 .. 1 where 0.1 was predicted: a factor of 9 covers nine of ten, and in a class a tenth
