@@ -10,22 +10,19 @@
 #include "apps/check/check.h"
 #include "apps/common/command_line/program.h"
 #include "io/files/file.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 
 void declare(Arguments& a) {
-  a.positional(
-      "WHAT",
-      "gradients: all of them against finite differences, in double precision; bits: the hashes that every "
-      "processor has to give; machine: processor, disk, ports; udev: prints a rule that opens the ports of "
-      "USB devices; file FILE [OTHER]: checksum, provenance, and "
-      "whether OTHER (recordings or a file) is what it was made from; chain FILE OTHER: whether model and "
-      "recordings (--data) are those that the header OTHER of its C code states, and give that code and "
-      "picture; "
-      "training FILE --data DIR: repeats "
-      "parts of a training that kept a ledger; step FILE --data DIR --step N: opens one step of it, with "
-      "every "
-      "operator");
+  a.positional("WHAT",
+               "gradients: all of them against finite differences, in double precision; bits: the hashes "
+               "that every processor has to give; machine: processor, disk, ports; udev: prints a rule that "
+               "opens the ports of USB devices; file FILE [OTHER]: checksum, provenance, and whether OTHER "
+               "(recordings or a file) is what it was made from; chain FILE OTHER: whether model and "
+               "recordings (--data) are those that the header OTHER of its C code states, and give that code "
+               "and picture; training FILE --data DIR: repeats parts of a training that kept a ledger; step "
+               "FILE --data DIR --step N: opens one step of it, with every operator");
   a.positional("FILE", "what is checked", false);
   a.positional("OTHER", "what it is compared with", false);
   a.option("data", "DIR", "training, step, chain: the recordings that the model was trained on");
@@ -58,13 +55,16 @@ int check_gradients(const Arguments& a) {
   throw FileError(program, std::string("cannot be run: ") + std::strerror(errno));
 }
 
-const std::map<const char*, std::vector<std::string>> kOptionsOf = {{"data", {"chain", "training", "step"}},
-                                                                    {"picture", {"chain"}},
-                                                                    {"segments", {"training"}},
-                                                                    {"seed", {"training"}},
-                                                                    {"step", {"step"}},
-                                                                    {"operator", {"step"}},
-                                                                    {"out", {"step"}}};
+const std::map<std::string, std::vector<std::string>> kReadBy = {
+    {"FILE", {"file", "chain", "training", "step"}},
+    {"OTHER", {"file", "chain"}},
+    {"data", {"chain", "training", "step"}},
+    {"picture", {"chain"}},
+    {"segments", {"training"}},
+    {"seed", {"training"}},
+    {"step", {"step"}},
+    {"operator", {"step"}},
+    {"out", {"step"}}};
 
 void need(const Arguments& a, const std::string& name) {
   if (!a.given(name)) throw UsageError(a.text("WHAT") + ": expected " + name + ", found none");
@@ -75,9 +75,10 @@ void need(const Arguments& a, const std::string& name) {
 int run(Arguments& a) {
   const std::string what =
       a.choice("WHAT", {"gradients", "bits", "machine", "udev", "file", "chain", "training", "step"});
-  for (const auto& [option, of] : kOptionsOf)
-    if (a.given(option) && std::ranges::find(of, what) == of.end())
-      throw UsageError(std::string("--") + option + ": nothing that " + what + " reads; leave it out");
+  for (const auto& [name, of] : kReadBy)
+    if (a.given(name) && std::ranges::find(of, what) == of.end())
+      throw UsageError((name == "FILE" || name == "OTHER" ? in_quotes(a.text(name)) : "--" + name) +
+                       ": nothing that " + what + " reads; leave it out");
   if (what == "gradients") return check_gradients(a);
   if (what == "bits") return check_bits(a);
   if (what == "machine") return check_machine(a);

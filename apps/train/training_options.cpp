@@ -69,10 +69,11 @@ static void declare_windows(Arguments& a) {
            "trials, and signals in which nothing is felt; none, as in preset frame",
            "standard");
   a.option(
-      "interval-factor", "X,Y",
+      "interval-factor", "X,Y[,Z]",
       "half the width of a pixel's 90 % interval: X times the largest difference from a pixel around it, "
       "and Y times its predicted error, as supertac-evaluate finds Y on passes that the network has not "
-      "seen; one number is Y alone; split group finds Y on the tested groups",
+      "seen; Z adds Z times the signal of the pixel's taxel to that error (docs/interoperate.md); one number "
+      "is Y alone; split group finds Y on the tested groups",
       PixelInterval{}.text());
   a.flag(
       "last-frame",
@@ -149,8 +150,10 @@ Recipe recipe_of(const Arguments& a) {
   if (a.given("interval-factor")) {
     r.interval_factor = PixelInterval::read(a.text("interval-factor"));
     if (!r.interval_factor)
-      throw UsageError("--interval-factor: expected X,Y or Y, X from 0 to 10 and Y from 0.05 to 100, found " +
-                       in_quotes(a.text("interval-factor")));
+      throw UsageError(
+          "--interval-factor: expected X,Y or X,Y,Z or Y, X from 0 to 10, Y from 0.05 to 100 and Z from 0 to "
+          "4096, found " +
+          in_quotes(a.text("interval-factor")));
   }
   if (a.flag("last-frame")) r.model.last_frame_path = true;
   if (a.given("beta")) r.loss.beta = a.number("beta", 0, 1e6);

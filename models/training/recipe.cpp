@@ -54,8 +54,11 @@ void Recipe::check() const {
   require(random_plates >= 0 && random_plates <= 50'000, "random_plates from 0 to 50000",
           static_cast<double>(random_plates));
   const PixelInterval interval = interval_factor.value_or(PixelInterval{});
-  require(PixelInterval::read(interval.text()).has_value(), "interval_factor from 0.05 to 100",
-          interval.factor);
+  if (!PixelInterval::read(interval.text()))
+    throw std::invalid_argument(
+        "recipe: expected interval_factor X,Y,Z with X from 0 to 10, Y from 0.05 to 100 and Z from 0 to "
+        "4096, got " +
+        interval.text());
   if (range) require(std::abs(range->span) > 1e-6, "a span that is not 0", range->span);
   if (per_window && model.timesteps == 1)
     throw std::invalid_argument(
