@@ -3,8 +3,10 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "data/frames/binary_columns.h"
+#include "data/frames/binary_decoder.h"
 #include "data/frames/probe.h"
 #include "io/numbers/median.h"
 #include "io/numbers/text.h"
@@ -167,13 +169,34 @@ std::string framing_of(Bytes bytes) {
   return "";
 }
 
+bool holds_seven_bits(const BinaryReading& reading, std::span<const Heard> heard) {
+  if (bytes_of(reading.format.type) != 2) return false;
+  std::vector<int> high(reading.values, -1);
+  bool changes = false, eighth = false;
+  Sensor sensor;
+  sensor.array.rows = 1, sensor.array.columns = static_cast<int>(reading.values),
+  sensor.frame = reading.format;
+  BinaryDecoder decoder(sensor);
+  for (const Heard& chunk : heard)
+    decoder.push(std::as_bytes(std::span(chunk.bytes)), [&](const DecodedFrame& frame) {
+      for (std::size_t k = 0; k < high.size(); ++k) {
+        const int value = static_cast<int>(frame.values[k]),
+                  before = std::exchange(high[k], value >> 8 & 0xFF);
+        eighth = eighth || (value & 0x80) != 0, changes = changes || (before >= 0 && before != high[k]);
+      }
+    });
+  return changes && !eighth;
+}
+
 std::string word_in(Bytes bytes, std::size_t period) {
   std::string longest, word;
   for (std::size_t c = 0; c < 2 * period && c < bytes.size(); ++c) {
     const char byte = static_cast<char>(bytes[c]);
     bool stays = (lower(byte) >= 'a' && lower(byte) <= 'z') || byte == '/' || byte == '_';
+    std::size_t changes = 0;  // where a byte is lost, the next one stays there
     for (std::size_t at = c % period + period; stays && at < bytes.size(); at += period)
-      stays = bytes[at] == bytes[at - period];
+      changes += bytes[at] != bytes[at - period] ? 1 : 0;
+    stays = stays && 20 * changes <= bytes.size() / period;
     word = stays ? word + byte : "";
     const bool varied = std::set(word.begin(), word.end()).size() > 2;
     if (varied && word.size() > std::max<std::size_t>(4, longest.size()) && word.size() <= period)

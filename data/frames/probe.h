@@ -72,6 +72,8 @@ struct BinaryReading {
   bool sign_unsure = false;            ///< signed, though what is below 0 is the same number each time
   std::string text() const;
 };
+/// Of numbers of two bytes a higher one changes, and no lower one has its highest bit.
+bool holds_seven_bits(const BinaryReading& reading, std::span<const Heard> heard);
 /// Readings of the bytes, the best first, no two of which give the same numbers. Header (0 to 4 bytes),
 /// clock, counter, type, byte order, count, checksum and what it covers, and trailer are found at once, by
 /// the length of the bytes' description (binary_columns.h). `values`: how many a frame has, where that is

@@ -288,26 +288,6 @@ class Search {
   std::map<std::tuple<std::size_t, std::size_t, std::size_t, bool, std::size_t>, BinaryReading> best_;
 };
 
-/// Of numbers of two bytes a higher one changes, and no lower one has its highest bit.
-bool holds_seven_bits(const BinaryReading& reading, std::span<const Heard> heard) {
-  if (bytes_of(reading.format.type) != 2) return false;
-  std::vector<int> high(reading.values, -1);
-  bool changes = false, eighth = false;
-  Sensor sensor;
-  sensor.array.rows = 1, sensor.array.columns = static_cast<int>(reading.values),
-  sensor.frame = reading.format;
-  BinaryDecoder decoder(sensor);
-  for (const Heard& chunk : heard)
-    decoder.push(std::as_bytes(std::span(chunk.bytes)), [&](const DecodedFrame& frame) {
-      for (std::size_t k = 0; k < high.size(); ++k) {
-        const int value = static_cast<int>(frame.values[k]),
-                  before = std::exchange(high[k], value >> 8 & 0xFF);
-        eighth = eighth || (value & 0x80) != 0, changes = changes || (before >= 0 && before != high[k]);
-      }
-    });
-  return changes && !eighth;
-}
-
 }  // namespace
 
 std::string BinaryReading::text() const {
@@ -361,8 +341,19 @@ std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
     says.push_back("binary without a period: a wrong baud rate, an unknown checksum or type, or no sensor");
     return std::nullopt;
   }
-  const BinaryReading& best = found[0];
-  if (const std::string word = word_in(bytes, best.period); !word.empty()) {
+  // Bytes that jump between two levels may be as short with a sign as without: as most, they then have none.
+  const auto twin = std::ranges::find_if(found, [&](const BinaryReading& r) {
+    return &r != &found[0] && r.bits < found[0].bits + kClearLead && r.values == found[0].values &&
+           r.format.type.substr(1) + found[0].format.type.substr(1) == "88" &&
+           r.format.fields.size() == found[0].format.fields.size();
+  });
+  const bool sign_assumed = twin != found.end();
+  const BinaryReading& best = sign_assumed && twin->format.type == "u8" ? *twin : found[0];
+  // Values of a byte may rest at letters; a word reaches into what is no value.
+  const std::string marks = best.format.header + best.format.trailer;
+  const bool lettered = std::ranges::any_of(marks, [](char c) { return lower(c) >= 'a' && lower(c) <= 'z'; });
+  const std::string word = lettered || best.format.type.back() != '8' ? word_in(bytes, best.period) : "";
+  if (!word.empty()) {
     says.push_back("frames with words, as " + in_quotes(word) + ": OSC, MessagePack or the like, which no " +
                    "sensor's file can describe; let the sensor send numbers alone, or as text");
     return std::nullopt;
@@ -374,7 +365,10 @@ std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
            (r.period == best.period && r.format.type == best.format.type && r.values < best.values &&
             r.bits < best.bits + 11);
   });
-  const BinaryReading* second = rival != found.end() ? &*rival : found.size() > 1 ? &found[1] : nullptr;
+  const auto next = std::ranges::find_if(found, [&](const BinaryReading& r) {
+    return &r != &best && !(sign_assumed && (&r == &found[0] || &r == &*twin));
+  });
+  const BinaryReading* second = rival != found.end() ? &*rival : next != found.end() ? &*next : nullptr;
   const double lead = rival != found.end() ? 0 : second != nullptr ? second->bits - best.bits : kMostLead;
   const bool seven = holds_seven_bits(best, heard);
   if (lead < kClearLead || best.unknown || best.mixed || best.sign_unsure || seven) {
@@ -391,6 +385,8 @@ std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
   }
   says.push_back("binary: " + best.text());
   if (second != nullptr) says.push_back("the next best reading: " + second->text());
+  if (sign_assumed)
+    says.push_back("assumed: its numbers have no sign, though i8 explains as much; set \"frame.type\"");
   if (best.unit_assumed)
     says.push_back("assumed: its clock counts units of " + format(best.format.time->unit_s) +
                    " s; a file does not tell; set \"frame.time.unit\"");

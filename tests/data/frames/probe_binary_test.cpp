@@ -169,6 +169,9 @@ Outcome outcome_of(Layout& layout) {
     if (said && a.size() == b.size()) a.pop_back(), b.pop_back();
     same = a == b;
   }
+  // What the bytes do not tell is said.
+  if (!same && layout.says.find("assumed: its numbers have no sign") != std::string::npos)
+    return Outcome::refused;
   return same ? Outcome::right : Outcome::wrong;
 }
 
@@ -286,9 +289,25 @@ TEST(ProbeBinary, FramingsAreRefusedByName) {
         }
         layout.heard[0].bytes += name == "seven" ? frame + "\xF7" : word ? frame : framed(frame, name);
       }
+      if (name.size() == 6 && seed % 2 == 0) layout.heard[0].bytes.erase(layout.heard[0].bytes.size() / 3, 1);
       EXPECT_EQ(outcome_of(layout), Outcome::refused) << layout.says;
       EXPECT_NE(layout.says.find(name), std::string::npos) << layout.says;
     }
+}
+
+TEST(ProbeBinary, BytesThatRestAtLettersAreNoWords) {
+  Layout layout;
+  layout.sensor.array = {.rows = 4, .columns = 4};
+  layout.sensor.frame = {.kind = FrameKind::binary, .header = "\xAA\x55", .type = "u8"};
+  layout.heard = {{100, ""}};
+  for (std::size_t n = 0; n < 400; ++n) {
+    layout.heard[0].bytes += "\xAA\x55";
+    for (std::size_t k = 0; k < 16; ++k)
+      layout.heard[0].bytes +=
+          static_cast<char>(97 + k * 5 % 16 + (k % 5 == 2 && n / 40 % 4 == k / 4 ? n % 40 : 0));
+  }
+  outcome_of(layout);
+  EXPECT_EQ(layout.says.find("words"), std::string::npos) << layout.says;
 }
 
 TEST(ProbeBinary, PrintableValuesAreNoText) {
