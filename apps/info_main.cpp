@@ -58,8 +58,8 @@ Json card_of_recording(const std::string& path) {
   const std::size_t n = recording.frames();
   const double duration = n > 0 ? recording.time_s.back() - recording.time_s.front() : 0;
   return {{"frames", n},
-          {"duration_s", std::round(1e3 * duration) / 1e3},
-          {"mean_rate_hz", duration > 0 ? std::round(1e3 * static_cast<double>(n - 1) / duration) / 1e3 : 0},
+          {"duration_s", duration},
+          {"mean_rate_hz", duration > 0 ? static_cast<double>(n - 1) / duration : 0},
           {"position_known", !recording.position_mm.empty()}};
 }
 
@@ -117,6 +117,10 @@ void print_card(const Arguments& arguments, const Json& card, const std::string&
                   tensor["dtype"].get<std::string>() + " " + tensor["shape"].dump());
     } else if (ours && key == "provenance") {
       for (const Json& filling : value) arguments.print(""), print_card(arguments, filling, "", false);
+    } else if (ours && value.is_number_float()) {
+      print_row(arguments, key, std::round(1e3 * value.get<double>()) / 1e3);
+    } else if (ours && key == "checksum" && value == "absent") {
+      print_row(arguments, key, "absent: written by another program, damage cannot be seen");
     } else {
       print_row(arguments, before + key, value);
     }

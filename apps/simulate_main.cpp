@@ -140,11 +140,9 @@ void declare(Arguments& arguments) {
       .option("speeds", "MM_PER_S,...", "sliding speeds in mm/s", "5,10")
       .option("trials", "N", "trials of every plate and speed", "2")
       .option("passes", "N", "passes of every trial, 5 mm apart in x (at most 8)", "8")
-      .option(
-          "sensor", "FILE",
-          "a sensor's file: its array, rate, unit, polarity and range instead of the rig's; rig: the rig's "
-          "frames before the board's filter",
-          "rig")
+      .option("sensor", "FILE",
+              "a sensor's file: its array, rate, unit, polarity and range instead of the rig's; without the "
+              "option: the rig behind its board's filter and ADC; `rig`: before them")
       .option(
           "presses", "N",
           "instead of passes N presses of the sensor: none to four objects at a time that come, move and go, "
@@ -180,7 +178,8 @@ Sensor fitted(const Arguments& arguments, const Sensor& sensor) {
 
 int run(Arguments& arguments) {
   const auto plates = read_plates(arguments);
-  Sensor sensor = read_sensor(arguments.text("sensor"));
+  Sensor sensor;
+  if (arguments.given("sensor")) sensor = read_sensor(arguments.text("sensor"));
   if (arguments.given("fit")) sensor = fitted(arguments, sensor);
   const auto settings = read_settings(arguments, sensor);
   const std::uint64_t seed = arguments.seed();

@@ -10,7 +10,6 @@
 #include "io/numbers/random.h"
 
 namespace supertac {
-namespace {}  // namespace
 
 EpochOrder::EpochOrder(std::uint64_t count, std::uint64_t seed, std::uint64_t epoch) : count_(count) {
   if (count < 1 || count > std::uint64_t{1} << 32)

@@ -12,6 +12,8 @@
 namespace supertac {
 namespace {
 
+constexpr std::size_t kShown = 120;
+
 bool is_rig(const Sensor& sensor) { return sensor.frame.kind == FrameKind::board; }
 
 }  // namespace
@@ -26,8 +28,8 @@ std::span<const ReadFrame> FrameReader::read(Port& port, double until, double& t
   std::array<std::byte, 65536> buffer;  // no datagram is longer, and a terminal holds a sixteenth
   const Received got = port.read(buffer, until);
   const auto bytes = std::span(buffer).first(got.count);
-  if (without_frame_.size() < buffer.size())
-    for (const std::byte byte : bytes) without_frame_ += std::to_integer<char>(byte);
+  for (const std::byte byte : bytes.first(std::min(bytes.size(), kShown - without_frame_.size())))
+    without_frame_ += std::to_integer<char>(byte);
   if (decoder_->counters().frames == 0)
     for (const std::byte byte : bytes) text_bytes_ += is_text(byte) ? 1 : 0;
   return decode(bytes, time_s = got.time_s);
@@ -146,7 +148,7 @@ void SensorReader::check_silence(double time_s) {
                       "plug the board out and in again");
   }
   const std::string at = "sensor " + sensor_.name + " at " + port_->name() + ": expected ";
-  const std::string such = ", such as '" + printable(frames_.without_frame()) + "'; ";
+  const std::string such = ", such as '" + printable(frames_.without_frame(), kShown) + "'; ";
   if (never && bytes > 0)
     throw WrongDevice(at + "frames of " + std::to_string(sensor_.values()) + " values, found " +
                       std::to_string(bytes) + " bytes without one" + such +

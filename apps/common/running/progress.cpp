@@ -1,6 +1,7 @@
 #include "apps/common/running/progress.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -31,13 +32,16 @@ bool drawable_terminal() {
 }
 
 // Opened anew: O_NONBLOCK on stderr itself would change it for the shell and everybody else who shares it.
+// Where that is refused (another user's terminal, no /proc) it is stderr, byte by byte while it takes them.
 TerminalLine::TerminalLine()
-    : terminal_(::open("/proc/self/fd/2", O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)) {}
+    : terminal_(::open("/proc/self/fd/2", O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)) {
+  if (terminal_ < 0) terminal_ = STDERR_FILENO;
+}
 
 TerminalLine::~TerminalLine() {
   left_ += "\r" + std::string(width_, ' ') + "\r";
   (void)send_left();
-  if (terminal_ >= 0) ::close(terminal_);
+  if (terminal_ != STDERR_FILENO) ::close(terminal_);
 }
 
 // A terminal that takes nothing (Ctrl-S, a stuck connection) is left alone, with what it has not taken.
@@ -54,8 +58,11 @@ void TerminalLine::show(std::string line) {
 }
 
 bool TerminalLine::send_left() {
+  const bool shared = terminal_ == STDERR_FILENO;
   while (!left_.empty()) {
-    const ssize_t count = ::write(terminal_, left_.data(), left_.size());
+    pollfd takes{terminal_, POLLOUT, 0};
+    if (shared && ::poll(&takes, 1, 0) != 1) return false;
+    const ssize_t count = ::write(terminal_, left_.data(), shared ? 1 : left_.size());
     if (count < 0 && errno == EINTR) continue;
     if (count < 0 && errno != EAGAIN) left_.clear();  // the terminal is gone
     if (count <= 0) return false;

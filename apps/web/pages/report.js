@@ -68,13 +68,16 @@ function chart(title, x, y, series) {
     const places = points.map(([a, b]) => [across.at(a), up.at(b)]);
     const legend = shown.length < 2 ? "" : `<rect x="${left + 180 * n}" y="22" width="14" height="4"
         fill="${colour(n)}"/>` + words(left + 180 * n + 19, 28, "start", name);
-    const dots = points.length < 40 ? places.map(([a, b]) => `<circle cx="${a}" cy="${b}" r="3.5" fill="${colour(n)}"/>`) : [];
+    const dot = ([a, b]) => `<circle cx="${a}" cy="${b}" r="3.5" fill="${colour(n)}"/>`;
+    const dots = points.length < 40 ? places.map(dot) : [];
     return `<polyline fill="none" stroke-width="1.8" stroke="${colour(n)}" points="${places.join(" ")}"/>` +
         dots.join("") + legend;
   });
-  return `<svg viewBox="0 0 620 270" role="img" aria-label="${title}">` + words(left, 13, "start", title, 'class="title"') +
+  return `<svg viewBox="0 0 620 270" role="img" aria-label="${title}">` +
+      words(left, 13, "start", title, 'class="title"') +
       [...lines, ...marks, ...curves].join("") + words((left + right) / 2, 264, "middle", x.label) +
-      `<g transform="translate(12 ${(top + bottom) / 2}) rotate(-90)">${words(0, 0, "middle", y.label || "")}</g></svg>`;
+      `<g transform="translate(12 ${(top + bottom) / 2}) rotate(-90)">` +
+      `${words(0, 0, "middle", y.label || "")}</g></svg>`;
 }
 
 function curves(title, note, charts) {
@@ -91,7 +94,7 @@ function training() {
   const step = {label: "step"}, log = {logarithmic: true};
   const other = (title, name, y) => chart(title, step, y, {[name]: of(name)});
   return [
-    curves("Learning curves", "training pictures are augmented and of whole passes, test pictures those in contact", [
+    curves("Learning curves", "training pictures are augmented and of whole passes, test pictures in contact", [
       chart("SSIM, linear axes", step, {label: "SSIM", most: 1}, ssim()),
       chart("1 - SSIM, logarithmic axes", {...step, ...log}, {label: "1 - SSIM", ...log}, ssim((v) => 1 - v))]),
     curves("Other curves", "means over the steps since the point before", [
@@ -126,22 +129,25 @@ function evaluation() {
   const method = ([name, m]) => [name, m.contact.ssim, m.contact.psnr_mean_db, m.contact.position_error_mm,
     m.all.ssim, m.all.psnr_mean_db, r.latency[name].median_us];
   const zones = ["contact", "edge", "flat", "air", "all"].filter((z) => z in r && !(measured && z === "air"));
-  const groups = table([[data.grouped ? "group" : "plate"], ["contact", 0], ["SSIM", 3], ["PSNR dB", 2], ["position mm", 2],
-    ["all SSIM", 3]], r.groups.map((g) =>
+  const groups = table([[data.grouped ? "group" : "plate"], ["contact", 0], ["SSIM", 3], ["PSNR dB", 2],
+    ["position mm", 2], ["all SSIM", 3]], r.groups.map((g) =>
     [g.name, g.contact.windows, g.contact.ssim, g.contact.psnr_mean_db, g.contact.position_error_mm, g.all.ssim]));
-  const zone = table([["zone"], ["windows", 0], ["SSIM", 3], ["PSNR dB", 2], ["ghosts %", 2], ["misses %", 2]], zones.map((z) =>
+  const zone = table([["zone"], ["windows", 0], ["SSIM", 3], ["PSNR dB", 2], ["ghosts %", 2],
+    ["misses %", 2]], zones.map((z) =>
     [measured && z === "flat" ? "rest" : z, r[z].windows, r[z].ssim, r[z].psnr_mean_db, percent(r[z].ghost_rate),
       percent(r[z].miss_rate)]));
   const parts = [
-    make("p", {class: "quiet"}, `${r.model}, split ${r.split}, ${r.all.windows} windows, ${r.contact.windows} in contact`),
+    make("p", {class: "quiet"},
+        `${r.model}, split ${r.split}, ${r.all.windows} windows, ${r.contact.windows} in contact`),
     section("Scores beside the baselines", measured ? "contact windows: something presses the array" :
       "contact windows: some texture lies under the array",
     table([["method"], ["contact SSIM", 3], ["PSNR dB", 2], ["position mm", 2], ["all SSIM", 3], ["PSNR dB", 2],
       ["one picture, us", 1]], [["network", r], ...Object.entries(r.baselines || {})].map(method), true)),
     make("div", {class: "two"}, section(data.grouped ? "By group" : "By plate", "the worst first", groups),
         section(measured ? "Contact, edge, rest" : "Contact, flat plate, air", (measured ?
-          `contact: a pixel of the measured truth shows more than ${text(r.contact_level, 3)}; edge: it reaches the ` +
-          "array's border; ghosts: pictures that show something at rest; misses: pictures that show nothing of a contact" :
+          `contact: a pixel of the measured truth shows more than ${text(r.contact_level, 3)}; edge: it reaches ` +
+          "the array's border; ghosts: pictures that show something at rest; misses: pictures that show nothing " +
+          "of a contact" :
           "ghosts: pictures that show a texture where the plate is flat; misses: pictures that show nothing of one; " +
           "windows beside a texture, within 3 mm of it, count among all only"), zone))];
   if (r.trust.coverage_of)
@@ -167,4 +173,8 @@ function evaluation() {
 }
 
 element("title").textContent = document.title = data.title;
-element("content").append(...(data.log === undefined ? evaluation() : training()));
+try {
+  element("content").append(...(data.log === undefined ? evaluation() : training()));
+} catch (error) {
+  element("content").append(make("p", {class: "card"}, `This page cannot be drawn: ${error}`));
+}

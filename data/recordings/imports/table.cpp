@@ -120,23 +120,30 @@ bool holds_row(std::string_view line) {
   return !content.empty() && content.front() != '#';
 }
 
-/// What a file without a grammar of numbers is, as the end of a sentence.
-std::string other_than_table(const std::string& whole) {
+/// What a file without a table is, as the end of a sentence; empty where that is text, or unknown, and no
+/// `lines` are given, which have no grammar.
+std::string other_than_table(const std::string& whole, const std::vector<std::string>& lines) {
   const Heard heard{0, whole.substr(0, 1 << 16)};
   const ProbeReport report = probe({&heard, 1}, "-", {});
+  const FrameKind kind = report.draft ? report.draft->frame.kind : FrameKind::text;
+  if (kind != FrameKind::text)
+    return std::string("holds no table but ") +
+           (kind == FrameKind::json    ? "objects of JSON"
+            : kind == FrameKind::board ? "frames of the rig's board"
+                                       : "binary frames") +
+           "; supertac-stream --sensor FILE --record DIR reads them, where \"port\" of the sensor's file is "
+           "this one";
+  if (lines.empty()) return "";
+  const auto numbers = std::ranges::count_if(lines, [](const std::string& line) {
+    return holds_row(line) && line.find_first_not_of("0123456789+-.,;eE \t\r") == std::string::npos;
+  });
   const auto guess = std::ranges::find_if(
       report.says, [](const std::string& line) { return line.starts_with("it may be: "); });
   const std::string& why = guess != report.says.end() ? *guess : report.says.back();
-  if (!report.draft)
-    return "holds no line of numbers (" + why.substr(0, why.find(';')) +
-           "); expected a row a line, separated by commas, tabs or blanks";
-  const FrameKind kind = report.draft->frame.kind;
-  return std::string("holds no table but ") +
-         (kind == FrameKind::json    ? "objects of JSON"
-          : kind == FrameKind::board ? "frames of the rig's board"
-                                     : "binary frames") +
-         "; supertac-stream --sensor FILE --record DIR reads them, where \"port\" of the sensor's file is "
-         "this one";
+  return (2 * numbers > std::ssize(lines) ? "holds lines of numbers, but no form that half of them have"
+                                          : "holds no line of numbers") +
+         (report.draft ? "" : " (" + why.substr(0, why.find(';')) + ")") +
+         "; expected a row a line, separated by commas, tabs or blanks";
 }
 
 Table text_table(const std::string& path) {
@@ -150,7 +157,7 @@ Table text_table(const std::string& path) {
   std::vector<std::string> learnt;
   while (!text.empty() && learnt.size() < 2000) learnt.emplace_back(next());
   const std::optional<TextGrammar> grammar = find_grammar(learnt);
-  if (!grammar) throw FileError(path, other_than_table(whole));
+  if (!grammar) throw FileError(path, other_than_table(whole, learnt));
   if (!grammar->doubt.empty()) throw FileError(path, "two readings explain it alike: " + grammar->doubt);
   Table table;
   table.columns = grammar->columns.size(), table.shape = {table.columns};
@@ -187,8 +194,9 @@ Table text_table(const std::string& path) {
     const auto control = [](char c) {
       return c > 0 && c < ' ' && std::string_view("\t\n\r\x1B").find(c) == std::string_view::npos;
     };
-    if (50 * std::ranges::count_if(whole, control) > std::ssize(whole))
-      throw FileError(path, other_than_table(whole));
+    const bool binary = 50 * std::ranges::count_if(whole, control) > std::ssize(whole);
+    if (const std::string other = binary ? other_than_table(whole, {}) : ""; !other.empty())
+      throw FileError(path, other);
     throw FileError(path, std::to_string(table.dropped) + " of " + std::to_string(lines) + " lines are not " +
                               std::to_string(table.columns) +
                               " numbers, expected at most a tenth; is it a table of numbers?");

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -49,45 +50,32 @@ TEST(Arguments, DefaultsAndValues) {
 }
 
 TEST(Arguments, MistakesAreNamed) {
-  EXPECT_EQ(message_of([] { parsed({}); }), "missing FILE: a file");
-  EXPECT_EQ(message_of([] {
-              parsed({"x", "--cuont", "3"});
-            }),
-            "unknown option '--cuont'; did you mean '--count'?");
-  EXPECT_EQ(message_of([] { parsed({"x", "--zzzzzz"}); }), "unknown option '--zzzzzz'");
-  EXPECT_EQ(message_of([] { parsed({"x", "y"}); }), "unexpected argument 'y'");
-  EXPECT_NE(message_of([] { parsed({"x", "--count"}); }), "nothing thrown");
-  EXPECT_EQ(message_of([] {
-              parsed({"x", "--count", "12"}).integer("count", 1, 9);
-            }),
-            "--count: expected a whole number from 1 to 9, found '12'");
-  EXPECT_EQ(message_of([] {
-              parsed({"x", "--list", "1,nan"}).numbers("list", 0, 9);
-            }),
-            "--list: expected numbers from 0 to 9, found 'nan'");
-  EXPECT_EQ(message_of([] {
-              parsed({"x", "--list", "1,,2"}).list("list");
-            }),
-            "--list: expected a list without empty elements, found '1,,2'");
-  EXPECT_EQ(message_of([] {
-              parsed({"x", "--list", "1,"}).list("list");
-            }),
-            "--list: expected a list without empty elements, found '1,'");
-  EXPECT_EQ(message_of([] {
-              parsed({"x", "--list", "1,1"}).list("list");
-            }),
-            "--list: expected every element once, found '1,1'");
-  EXPECT_EQ(message_of([] {
-              parsed({"x", "--kind", "bumbs"}).choice("kind", {"ridges", "bumps"});
-            }),
-            "--kind: expected one of ridges, bumps, found 'bumbs'; did you mean 'bumps'?");
+  const auto said_of = [](const std::vector<const char*>& words) {
+    return message_of([&] {
+      const Arguments given = parsed(words);
+      given.integer("count", 1, 9), given.numbers("list", 0, 9), given.choice("kind", {"ridges", "bumps"});
+    });
+  };
+  const std::pair<std::vector<const char*>, std::string> cases[] = {
+      {{}, "missing FILE: a file"},
+      {{"x", "--cuont", "3"}, "unknown option '--cuont'; did you mean '--count'?"},
+      {{"x", "--zzzzzz"}, "unknown option '--zzzzzz'"},
+      {{"x", "y"}, "unexpected argument 'y'"},
+      {{"x", "--count", "12"}, "--count: expected a whole number from 1 to 9, found '12'"},
+      {{"x", "--list", "1,nan"}, "--list: expected numbers from 0 to 9, found 'nan'"},
+      {{"x", "--list", "1,,2"}, "--list: expected a list without empty elements, found '1,,2'"},
+      {{"x", "--list", "1,"}, "--list: expected a list without empty elements, found '1,'"},
+      {{"x", "--list", "1,1"}, "--list: expected every element once, found '1,1'"},
+      {{"x", "--kind", "bumbs"},
+       "--kind: expected one of ridges, bumps, found 'bumbs'; did you mean 'bumps'?"}};
+  for (const auto& [words, said] : cases) EXPECT_EQ(said_of(words), said);
+  EXPECT_NE(said_of({"x", "--count"}), "nothing thrown");
 }
 
 TEST(Arguments, HelpShowsUnitsAndDefaultsAndNeedsNothing) {
   const std::string help = parsed({"--help"}).help();
-  for (const char* text : {"FILE", "--count N", "(default: 3)", "--json FILE", "--threads N"}) {
+  for (const char* text : {"FILE", "--count N", "(default: 3)", "--json FILE", "--threads N"})
     EXPECT_NE(help.find(text), std::string::npos) << text;
-  }
 }
 
 TEST(Nearest, NamesWhatWasMeantOrNothing) {
@@ -103,9 +91,8 @@ TEST(Threads, QuotaOfACgroup) {
   EXPECT_EQ(quota_of_cpu_max("200000 100000"), 2);
   EXPECT_EQ(quota_of_cpu_max("150000 100000"), 2);
   EXPECT_EQ(quota_of_cpu_max("1000 100000"), 1);
-  for (const char* text : {"max 100000", "", "5", "0 100000", "100000 0", "-1 100000"}) {
+  for (const char* text : {"max 100000", "", "5", "0 100000", "100000 0", "-1 100000"})
     EXPECT_EQ(quota_of_cpu_max(text), std::nullopt) << text;
-  }
   EXPECT_GE(default_threads(), 1);
 }
 
@@ -116,6 +103,24 @@ TEST(Progress, LineTellsShareRateAndTimeLeft) {
   EXPECT_NE(progress_line("x", 1, 10'000, "steps", 1).find("2:46:39 left"), std::string::npos);
   EXPECT_EQ(progress_line("x", 50, 200, "steps", 5, "epoch 1/4"),
             "x  [##........]  25 %  epoch 1/4  0:30 left");
+}
+
+TEST(TerminalLine, IsShownWhereStderrCannotBeOpenedAnewAndWaitsForNobody) {
+  int ends[2];
+  ASSERT_EQ(socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);  // no socket can be opened by name
+  const int before = dup(STDERR_FILENO);
+  dup2(ends[0], STDERR_FILENO);
+  {
+    TerminalLine line;
+    line.show("more");
+    while (send(ends[0], "-", 1, MSG_DONTWAIT) == 1) continue;
+    line.show("most");
+  }
+  dup2(before, STDERR_FILENO);
+  char shown[6] = {};
+  recv(ends[1], shown, 5, 0);
+  EXPECT_STREQ(shown, "\rmore");
+  for (const int end : {before, ends[0], ends[1]}) close(end);
 }
 
 // Not to be replaced; what was said of a name that was taken goes to `said`.

@@ -431,6 +431,11 @@ def check_reports(binaries, folder, browser):
     assert abs((heights[0] - heights[1]) - (heights[1] - heights[2])) < 0.21, "equal factors are equal steps"
     assert ">1.1<" not in browser.js("return chart('', {label: ''}, {most: 1}, {a: [[0, .5], [9, .99]]})")
     assert browser.js("return chart('', {label: ''}, {logarithmic: true}, {a: [[0, 0]]})") == ""
+    page = (folder / "report.html").read_text()
+    assert "<noscript>A script draws this page" in page
+    (folder / "damaged.html").write_text(page.replace('"groups":', '"group":'))
+    browser.open((folder / "damaged.html").as_uri())
+    assert "This page cannot be drawn: TypeError" in text(browser, "content"), text(browser, "content")
 
 
 def main():

@@ -241,11 +241,13 @@ TEST(SensorReader, WhatComesWithoutAFrameIsSaid) {
   const auto send = [master](const std::string& line) { return write(master, line.data(), line.size()) > 0; };
   const std::string at = "serial:" + std::string(name) + "@115200";
   auto reader = std::make_unique<SensorReader>(open_port(at), sensor);
-  ASSERT_TRUE(send("echo:busy: processing\n"));
+  const std::string busy = "echo:busy: " + std::string(98, 'p') + " for now\n" + std::string(60, 'q');
+  ASSERT_TRUE(send(busy));
   EXPECT_ERROR(all_of(*reader), WrongDevice,
                "sensor sensor at " + std::string(name) +
-                   ": expected frames of 4 values, found 22 bytes without one, such as 'echo:busy: "
-                   "processing?'; supertac-stream --probe says what they are");
+                   ": expected frames of 4 values, found 178 bytes without "
+                   "one, such as '" +
+                   busy.substr(0, 117) + "?qq'; supertac-stream --probe says what they are");
   reader.reset();  // the port is one reader's
   reader = std::make_unique<SensorReader>(open_port(at), sensor);
   ASSERT_TRUE(send("1,2,3,4\n") && reader->next(10) && send("1,2,1,2,1,2"));

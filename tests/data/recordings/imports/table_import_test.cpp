@@ -198,11 +198,13 @@ TEST_F(TableImport, ImpossibleValuesAreNamed) {
   expect_refusal(file(lines(30, "50,60,70,80\n", 3, "50,60,nan,80\n")), "",
                  "column 2 as value 2 of the frame is nan in line 4");
   expect_refusal(file("a b\nc d\n"), "", "holds no line of numbers (too few lines)");
-  std::string frames, slip;
+  std::string frames, slip, late, ragged;  // late: damaged behind what the probe looks at
   std::array<int, 8> walks;
   walks.fill(500);
   for (unsigned i = 0; i < 300; ++i) {
     frames += "\xAA\x55", slip += '\xC0';
+    ragged += std::string("5,6,7,8,9,5,6,7,8,9").substr(0, 2 * (i % 10) + 1) + "\n";
+    late += lines(30, i < 240 ? "50,60,70,80\n" : "\1\2\3\4\5\6\7\n");
     for (unsigned k = 0; k < 8; ++k) {
       walks[k] += static_cast<int>(21 * RandomStream(1, k).uniform(i)) - 10;
       const auto value = static_cast<unsigned>(walks[k]);
@@ -214,6 +216,8 @@ TEST_F(TableImport, ImpossibleValuesAreNamed) {
   }
   expect_refusal(file(frames), "", "holds no table but binary frames; supertac-stream --sensor FILE");
   expect_refusal(file(slip), "", "holds no line of numbers (frames in SLIP");
+  expect_refusal(file(late), "", "1800 of 9000 lines are not 4 numbers, expected at most a tenth");
+  expect_refusal(file(ragged), "", "holds lines of numbers, but no form that half of them have (");
   for (const auto& [map, why] :
        {std::pair("time=0:h", "time is in 'h', expected s, ms, us or ns"),
         {"time=0,x=1,y=2,time=3", "names time twice"},
