@@ -1,6 +1,6 @@
 #!/bin/sh
 # From nothing to super-resolved pictures: installs what is missing, builds, simulates, trains, evaluates.
-# Takes about six minutes on two cores, and shows a first picture after two. Everything it makes is in out/demo; of the
+# Takes three to six minutes on two cores, and shows a first picture after two. Everything it makes is in out/demo; of the
 # programs it builds those it needs, and scripts/test.sh or `cmake --build build` goes on from there.
 #   scripts/demo.sh [--no-install]     with --no-install it ends where a package is missing, and says which
 set -eu
