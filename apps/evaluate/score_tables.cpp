@@ -164,11 +164,9 @@ void TrustScores::add(const Drawn& drawn, const std::optional<ContactScore>& con
     ++judged_;
     unlike_ += model_.novelty->unlike_training(signal_features(drawn.input, windows_.array())) ? 1 : 0;
   }
-  if (!predicted_error.empty()) {
-    model_.interval().with_load(model_.model->format(), drawn.input, predicted_error, errors_);
+  if (!predicted_error.empty())
     coverage_.add(windows_.pass_of(drawn.example), drawn.pictures[0], windows_.image().width, drawn.target,
-                  errors_);
-  }
+                  predicted_error, drawn.input);
   if (contact && !predicted_error.empty())
     told_.emplace_back(std::accumulate(predicted_error.begin(), predicted_error.end(), 0.0),
                        contact->ssim < kBadSsim);

@@ -112,7 +112,7 @@ class TrustScores {
  public:
   /// `model`: whose interval and novelty are judged; must outlive this, as the windows.
   TrustScores(const WindowSet& windows, const ModelFile& model)
-      : windows_(windows), model_(model), coverage_(model.interval()) {}
+      : windows_(windows), model_(model), coverage_(model.interval(), model.model->format()) {}
   /// Windows of a pass come in the order of time. Without a predicted error nothing is counted of it.
   void add(const Drawn& drawn, const std::optional<ContactScore>& contact);
 
@@ -134,7 +134,6 @@ class TrustScores {
   const ModelFile& model_;
   IntervalCoverage coverage_;
   std::vector<std::pair<double, bool>> told_;  // of contact windows: sum of predicted errors, a bad picture
-  std::vector<float> errors_;
   std::uint64_t judged_ = 0, unlike_ = 0;
 };
 

@@ -68,15 +68,17 @@ void PixelInterval::with_load(const NetworkFormat& format, std::span<const float
 }
 
 void IntervalCoverage::add(std::size_t pass, std::span<const float> picture, std::int64_t width,
-                           std::span<const float> truth, std::span<const float> predicted_error) {
+                           std::span<const float> truth, std::span<const float> predicted_error,
+                           std::span<const float> input) {
   if (passes_.empty() || passes_.back().number != pass) passes_.push_back({.number = pass});
+  judged_.with_load(format_, input, predicted_error, errors_);
   for (std::size_t i = 0; i < picture.size(); ++i) {
     const auto height = static_cast<std::size_t>(
         std::ranges::count_if(kEdges, [t = std::abs(truth[i])](float edge) { return t > edge; }));
     Height& counts = passes_.back().heights[height];
     const double error = std::abs(double{picture[i]} - double{truth[i]}),
-                 reach = double{judged_.reach(picture, width, i, predicted_error[i])},
-                 predicted = double{at_least(predicted_error[i])};
+                 reach = double{judged_.reach(picture, width, i, errors_[i])},
+                 predicted = double{at_least(errors_[i])};
     const double ratio = (error - reach) / predicted + judged_.factor;
     const double bin = std::max(0.0, std::ceil(ratio * kBinsPerUnit - 1e-6) - 1);
     if (bin < double{kBins}) ++counts.ratios[static_cast<std::size_t>(bin)];

@@ -65,10 +65,13 @@ class IntervalCoverage {
     double share = 0, half_width = 0, pixels = 0;  ///< within; mean; how many
   };
 
-  explicit IntervalCoverage(const PixelInterval& judged = {}) : judged_(judged) {}
-  /// One picture, all three [height][width]; windows of a pass come one behind the other.
+  /// `format`: of the network, for a load.
+  explicit IntervalCoverage(const PixelInterval& judged = {}, const NetworkFormat& format = {})
+      : judged_(judged), format_(format) {}
+  /// One picture, its truth and predicted error [height][width], and the input that it was drawn from, which
+  /// a load asks for; windows of a pass come one behind the other.
   void add(std::size_t pass, std::span<const float> picture, std::int64_t width, std::span<const float> truth,
-           std::span<const float> predicted_error);
+           std::span<const float> predicted_error, std::span<const float> input = {});
   bool empty() const { return passes_.empty(); }
   // Not to be asked when empty():
   double share() const;  ///< of all pixels, mean over passes
@@ -93,7 +96,9 @@ class IntervalCoverage {
   };
 
   PixelInterval judged_;
+  NetworkFormat format_;
   std::vector<Pass> passes_;
+  std::vector<float> errors_;
 };
 
 }  // namespace supertac

@@ -1,5 +1,6 @@
 #include "models/training/train.h"
 
+#include <array>
 #include <chrono>
 #include <filesystem>
 #include <utility>
@@ -109,24 +110,25 @@ std::map<std::string, std::string> trained_origin(const Trainer& trainer, const 
   std::map<std::string, std::string> origin = task.origin;
   if (!task.finds_interval_factor || !trainer.model().settings().predicted_error) return origin;
   const std::vector<std::uint32_t> tested = evenly_spaced(task.split.test, kTestedPerEpoch);
-  const double most = static_cast<double>(task.windows->scale()) * static_cast<double>(task.windows->scale());
-  const auto judged = [&](const PixelInterval& interval) {
-    IntervalCoverage coverage(interval);
-    std::vector<float> errors;
-    for_each_output(
-        Ensemble({CompiledModel(trainer.model())}), *task.windows, tested, [&](const EvaluatedBatch& b) {
-          for (std::size_t n = 0; n < b.size(); ++n) {
-            interval.with_load(trainer.model().format(), b.input(n), b.predicted_error(n), errors);
-            coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n), task.windows->image().width,
-                         b.target(n), errors);
-          }
-          return true;
-        });
-    return coverage;
+  const Ensemble network({CompiledModel(trainer.model())});
+  const auto scale = static_cast<double>(task.windows->scale());
+  const auto judged = [&](const std::array<PixelInterval, 2>& intervals) {
+    std::array<IntervalCoverage, 2> coverages;
+    for (std::size_t i = 0; i < 2; ++i)
+      coverages[i] = IntervalCoverage(intervals[i], network.first().format());
+    for_each_output(network, *task.windows, tested, [&](const EvaluatedBatch& b) {
+      for (std::size_t n = 0; n < b.size(); ++n)
+        for (IntervalCoverage& coverage : coverages)
+          coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n), task.windows->image().width,
+                       b.target(n), b.predicted_error(n), b.input(n));
+      return true;
+    });
+    return coverages;
   };
-  const PixelInterval plain = judged({}).found(), loaded = judged({.load = most}).found();
-  origin["interval_factor"] =
-      (judged(loaded).half_width() < judged(plain).half_width() ? loaded : plain).text();
+  const auto plain_and_loaded = judged({PixelInterval{}, PixelInterval{.load = scale * scale}});
+  const std::array found{plain_and_loaded[0].found(), plain_and_loaded[1].found()};
+  const auto widths = judged(found);
+  origin["interval_factor"] = found[widths[1].half_width() < widths[0].half_width() ? 1 : 0].text();
   origin["interval_factor_found"] = "tested groups";
   return origin;
 }
