@@ -72,6 +72,7 @@ class IntervalCoverage {
   /// a load asks for; windows of a pass come one behind the other.
   void add(std::size_t pass, std::span<const float> picture, std::int64_t width, std::span<const float> truth,
            std::span<const float> predicted_error, std::span<const float> input = {});
+  const PixelInterval& judged() const { return judged_; }
   bool empty() const { return passes_.empty(); }
   // Not to be asked when empty():
   double share() const;  ///< of all pixels, mean over passes

@@ -125,10 +125,9 @@ std::map<std::string, std::string> trained_origin(const Trainer& trainer, const 
     });
     return coverages;
   };
-  const auto plain_and_loaded = judged({PixelInterval{}, PixelInterval{.load = scale * scale}});
-  const std::array found{plain_and_loaded[0].found(), plain_and_loaded[1].found()};
-  const auto widths = judged(found);
-  origin["interval_factor"] = found[widths[1].half_width() < widths[0].half_width() ? 1 : 0].text();
+  const auto first = judged({PixelInterval{}, PixelInterval{.load = scale * scale}});
+  const auto [plain, loaded] = judged({first[0].found(), first[1].found()});
+  origin["interval_factor"] = (loaded.half_width() < plain.half_width() ? loaded : plain).judged().text();
   origin["interval_factor_found"] = "tested groups";
   return origin;
 }
