@@ -18,6 +18,9 @@ std::string what_of(const auto& action) {
   return "nothing thrown";
 }
 
+/// The statement behind the text throws std::invalid_argument with exactly this text.
+#define EXPECT_REFUSAL(text, ...) EXPECT_EQ(what_of<std::invalid_argument>([&] { __VA_ARGS__; }), text)
+
 /// `statement` throws `Type`, and `part` stands in its what(), which is one line.
 #define EXPECT_ERROR(statement, Type, part)                        \
   EXPECT_THROW(                                                    \

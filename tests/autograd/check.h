@@ -6,10 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <functional>
 #include <initializer_list>
-#include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "autograd/gradient_checker.h"
@@ -36,64 +33,28 @@ inline Tensor numbers(const Shape& shape, std::uint64_t seed = 1, double low = -
   return t;
 }
 
-/// The same, but at least .1 from zero, where rectifiers have no derivative.
-inline Tensor numbers_off_zero(const Shape& shape, std::uint64_t seed = 1) {
-  Tensor t = numbers(shape, seed);
-  for (real& x : t.values()) x += static_cast<real>(x < 0 ? -0.1 : 0.1);
-  return t;
-}
-
 inline bool same_bytes(const Tensor& a, const Tensor& b) {
   return a.size() == b.size() &&
          std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(real)) == 0;
 }
 
 inline Variable parameter(const Tensor& t) { return Variable(t, true); }
+inline Variable zeros(const Shape& shape) { return Variable(Tensor::zeros(shape)); }
 
-/// A line of a test; std::source_location is more than Clang 14 can do with this standard library.
-struct Place {
-  const char* file;
-  int line;
-  static Place current(const char* file = __builtin_FILE(), int line = __builtin_LINE()) {
-    return {file, line};
+inline testing::AssertionResult has_values(const Tensor& found, const Shape& shape,
+                                           std::initializer_list<double> expected,
+                                           double tolerance = kRounding) {
+  if (found.shape() != shape) return testing::AssertionFailure() << "found " << found.shape().text();
+  const real* value = found.data();
+  for (const double wanted : expected) {
+    if (!(std::abs(static_cast<double>(*value) - wanted) <= tolerance * std::max(1.0, std::abs(wanted))))
+      return testing::AssertionFailure() << "element " << value - found.data() << " is " << *value;
+    ++value;
   }
-};
-
-/// What fails below names the line of the test that asked.
-class At {
- public:
-  explicit At(const Place& place) : trace_(place.file, place.line, "asked for here") {}
-
- private:
-  testing::ScopedTrace trace_;
-};
-
-inline void expect_values(const Tensor& found, const Shape& shape, std::initializer_list<double> expected,
-                          double tolerance = kRounding, const Place& place = Place::current()) {
-  const At at(place);
-  ASSERT_EQ(found.shape().text(), shape.text());
-  ASSERT_EQ(static_cast<std::size_t>(found.size()), expected.size());
-  Dim i = 0;
-  for (const double value : expected) {
-    EXPECT_NEAR(static_cast<double>(found.data()[i]), value, tolerance * std::max(1.0, std::abs(value)))
-        << "element " << i;
-    ++i;
-  }
+  return testing::AssertionResult(value == found.data() + found.size()) << "of other elements";
 }
 
-/// `action` must throw std::invalid_argument with exactly this text.
-inline void expect_refusal(const std::string& text, const std::function<void()>& action,
-                           const Place& place = Place::current()) {
-  const At at(place);
-  EXPECT_EQ(what_of<std::invalid_argument>(action), text);
-}
-
-inline double dot(const Tensor& a, const Tensor& b) {
-  double total = 0;
-  for (Dim i = 0; i < a.size(); ++i) {
-    total += static_cast<double>(a.data()[i]) * static_cast<double>(b.data()[i]);
-  }
-  return total;
-}
+/// A tensor, its shape, its elements {1, 2 ...} and, where rounding is larger than usual, a tolerance.
+#define EXPECT_VALUES(...) EXPECT_TRUE(supertac::test::has_values(__VA_ARGS__))
 
 }  // namespace supertac::test

@@ -29,7 +29,7 @@ Variable planted(const std::vector<Variable>& in, real by_b, real by_one) {
 
 GradientReport check_planted(real by_b, real by_one) {
   return checked([=](const auto& in) { return planted(in, by_b, by_one); },
-                 {test::numbers_off_zero({3, 4}), test::numbers_off_zero({3, 4}, 2)});
+                 {test::numbers({3, 4}), test::numbers({3, 4}, 2)});
 }
 
 #ifdef SUPERTAC_REAL_IS_DOUBLE

@@ -1,14 +1,12 @@
 #include "autograd/tensor.h"
 
+#include <thread>
 #include <utility>
 
 #include "tests/autograd/check.h"
 
 namespace supertac {
 namespace {
-
-using test::expect_refusal;
-using test::expect_values;
 
 TEST(Shape, TextAndElements) {
   EXPECT_EQ((Shape{4, 16, 16, 32}).text(), "[4,16,16,32]");
@@ -20,17 +18,13 @@ TEST(Shape, TextAndElements) {
 }
 
 TEST(Shape, RefusesWhatNoTensorCanHave) {
-  expect_refusal("Shape: dims expects at most 4, got 5", [] { Shape{1, 1, 1, 1, 1}; });
-  expect_refusal("Shape: dimension 1 expects 0 or more, and a product of 2^40 or less, got -1", [] {
-    Shape{2, -1};
-  });
-  expect_refusal("Shape: dimension 1 expects 0 or more, and a product of 2^40 or less, got 2097152", [] {
-    Shape{1 << 20, 1 << 21};
-  });
-  expect_refusal(
-      "Shape: dimension 1 expects 0 or more, and a product of 2^40 or less, got 9223372036854775807", [] {
-        Shape{2, INT64_MAX};
-      });
+  EXPECT_REFUSAL("Shape: dims expects at most 4, got 5", Shape{1, 1, 1, 1, 1});
+  EXPECT_REFUSAL("Shape: dimension 1 expects 0 or more, and a product of 2^40 or less, got -1", Shape{2, -1});
+  EXPECT_REFUSAL("Shape: dimension 1 expects 0 or more, and a product of 2^40 or less, got 2097152",
+                 Shape{1 << 20, 1 << 21});
+  EXPECT_REFUSAL(
+      "Shape: dimension 1 expects 0 or more, and a product of 2^40 or less, got 9223372036854775807",
+      Shape{2, INT64_MAX});
 }
 
 TEST(Tensor, CopyIsAHandleCloneIsACopy) {
@@ -47,17 +41,27 @@ TEST(Tensor, MoveLeavesNothingBehind) {
   const Tensor b = std::move(a);
   EXPECT_FALSE(a.defined());  // NOLINT(bugprone-use-after-move): the state after a move is what is tested
   EXPECT_EQ(a.size(), 0);
-  expect_values(b, {3}, {2, 2, 2});
+  EXPECT_VALUES(b, {3}, {2, 2, 2});
   Tensor c = b;
   Tensor& same = c;
   c = same;  // to itself
-  expect_values(c, {3}, {2, 2, 2});
+  EXPECT_VALUES(c, {3}, {2, 2, 2});
 }
 
 TEST(Tensor, ValuesAreAlignedForVectors) {
   for (const Dim size : {1, 3, 17, 1000}) {
     EXPECT_EQ(reinterpret_cast<std::uintptr_t>(Tensor(Shape{size}).data()) % 64, 0U);
   }
+}
+
+TEST(Tensor, MayOutliveTheThreadThatMadeItOrEndInAnother) {
+  for (int i = 0; i < 50; ++i) {
+    Tensor t = Tensor::full({1000}, 1);
+    std::thread([moved = std::move(t)]() mutable { moved = Tensor(); }).join();
+  }
+  Tensor made_elsewhere;
+  std::thread([&] { made_elsewhere = Tensor::full({3}, 5); }).join();
+  EXPECT_VALUES(made_elsewhere, {3}, {5, 5, 5});
 }
 
 TEST(Tensor, EmptyAndUndefinedAreHarmless) {
@@ -70,10 +74,8 @@ TEST(Tensor, EmptyAndUndefinedAreHarmless) {
 }
 
 TEST(Tensor, RefusesWrongCounts) {
-  expect_refusal("Tensor::of: values expects 4 numbers for [2,2], got 3", [] {
-    Tensor::of({2, 2}, {1, 2, 3});
-  });
-  expect_refusal("item: the tensor expects one element, got [2]", [] { Tensor::zeros({2}).item(); });
+  EXPECT_REFUSAL("Tensor::of: values expects 4 numbers for [2,2], got 3", Tensor::of({2, 2}, {1, 2, 3}));
+  EXPECT_REFUSAL("item: the tensor expects one element, got [2]", Tensor::zeros({2}).item());
   EXPECT_EQ(Tensor::full({1, 1}, 7).item(), 7);
 }
 

@@ -15,15 +15,13 @@
 namespace supertac {
 namespace {
 
-using test::expect_refusal;
-using test::expect_values;
 using test::parameter;
 
 TEST(Backward, AddsUpBothSidesOfADiamond) {
   const Variable x = parameter(Tensor::of({2}, {3, -2}));
   const Variable square = x * x;
   backward(sum(square * x + 2 * square));  // x^3 + 2 x^2
-  expect_values(x.grad(), {2}, {27 + 12, 12 - 8});
+  EXPECT_VALUES(x.grad(), {2}, {27 + 12, 12 - 8});
 }
 
 // Each level uses the one below twice: a visitor that follows paths would take 2^60 steps.
@@ -67,7 +65,7 @@ TEST(Backward, ADroppedGradientLeavesItsMemoryButNoValue) {
     EXPECT_FALSE(w.grad().defined());
     Variable(w).drop_grad();
     backward(sum(x * w));
-    expect_values(w.grad(), {1, 2, 2, 1}, {2, 2, 2, 2});
+    EXPECT_VALUES(w.grad(), {1, 2, 2, 1}, {2, 2, 2, 2});
     EXPECT_EQ(w.grad().data(), memory);
     Variable(w).drop_grad();
   }
@@ -85,15 +83,15 @@ TEST(Backward, FreesTheGraph) {
   const Variable middle = 2 * x, loss = sum(middle);
   backward(loss);
   EXPECT_FALSE(middle.grad().defined());
-  expect_refusal(
+  EXPECT_REFUSAL(
       "backward: sum expects its graph, got one that an earlier backward freed; run the forward pass again",
-      [&] { backward(loss); });
-  expect_refusal(
+      backward(loss));
+  EXPECT_REFUSAL(
       "backward: scale expects its graph, got one that an earlier backward freed; run the forward pass again",
-      [&] { backward(sum(middle)); });
+      backward(sum(middle)));
   const Variable fresh = 3 * x;
   backward(sum(fresh));  // a refused backward leaves nothing in the queue
-  expect_values(x.grad(), {2}, {5, 5});
+  EXPECT_VALUES(x.grad(), {2}, {5, 5});
 }
 
 TEST(Backward, FreesWhatAReverseStepHolds) {
@@ -107,10 +105,10 @@ TEST(Backward, FreesWhatAReverseStepHolds) {
 
 TEST(Backward, RefusesWhatHasNoGradient) {
   const Variable x = parameter(Tensor::full({2}, 3));
-  expect_refusal("backward: loss expects one element, got [2]", [&] { backward(1 * x); });
-  expect_refusal(
+  EXPECT_REFUSAL("backward: loss expects one element, got [2]", backward(1 * x));
+  EXPECT_REFUSAL(
       "backward: loss expects to depend on a variable that requires a gradient, got one that depends on none",
-      [&] { backward(sum(Variable(Tensor::full({2}, 3)))); });
+      backward(sum(Variable(Tensor::full({2}, 3)))));
 }
 
 TEST(Backward, AStepThatThrowsLeavesTheLeavesUsable) {
@@ -119,17 +117,17 @@ TEST(Backward, AStepThatThrowsLeavesTheLeavesUsable) {
       record("planted", x.value().clone(), {&x}, [](Backward&) { throw std::runtime_error("of the step"); });
   EXPECT_EQ(what_of<std::runtime_error>([&] { backward(sum(2 * y)); }), "of the step");
   backward(sum(2 * x));
-  expect_values(x.grad(), {2}, {2, 2});
+  EXPECT_VALUES(x.grad(), {2}, {2, 2});
 }
 
 TEST(Backward, RefusesAGradientOfAnotherShape) {
   Variable x = parameter(Tensor::full({2}, 3)), loss = sum(x);
   x.mutable_grad() = Tensor::zeros({1});
-  expect_refusal("backward: the gradient of leaf expects [2], got [1]", [&] { backward(loss); });
+  EXPECT_REFUSAL("backward: the gradient of leaf expects [2], got [1]", backward(loss));
   x.drop_grad();
   loss = sum(x);
   loss.mutable_grad() = Tensor::zeros({0});
-  expect_refusal("backward: the gradient of sum expects [], got [0]", [&] { backward(loss); });
+  EXPECT_REFUSAL("backward: the gradient of sum expects [], got [0]", backward(loss));
 }
 
 TEST(Trace, OnePerThread) {
@@ -148,12 +146,11 @@ TEST(Variable, RefusesToBeUsedWithoutAValue) {
                                         [&] { empty.mutable_grad(); }, [&] { empty.mutable_value(); },
                                         [&] { empty.drop_grad(); },    [&] { backward(empty); },
                                         [&] { inputs_of(empty); }};
-  for (const auto& use : uses) expect_refusal("Variable: used before it was given a value", use);
-  expect_refusal("sum: x expects a value, got an empty Variable", [&] { sum(empty); });
-  expect_refusal("scale: x expects a value, got an empty Variable", [&] { 2 * empty; });
-  expect_refusal("add: b expects a value, got an empty Variable",
-                 [&] { parameter(Tensor::zeros({1})) + empty; });
-  expect_refusal("Variable: value expects a tensor, got an undefined one", [] { parameter(Tensor()); });
+  for (const auto& use : uses) EXPECT_REFUSAL("Variable: used before it was given a value", use());
+  EXPECT_REFUSAL("sum: x expects a value, got an empty Variable", sum(empty));
+  EXPECT_REFUSAL("scale: x expects a value, got an empty Variable", 2 * empty);
+  EXPECT_REFUSAL("add: b expects a value, got an empty Variable", parameter(Tensor::zeros({1})) + empty);
+  EXPECT_REFUSAL("Variable: value expects a tensor, got an undefined one", parameter(Tensor()));
   EXPECT_STREQ(Variable().op(), "none");
   EXPECT_STREQ(parameter(Tensor::zeros({1})).op(), "leaf");
 }
@@ -204,8 +201,8 @@ TEST(Backward, AGraphMayBeContinuedOnAnotherThread) {
 TEST(Record, TakesAtMostEightInputs) {
   const Variable x = parameter(Tensor::full({1}, 1));
   const std::vector<const Variable*> inputs(9, &x);
-  expect_refusal("nine: inputs expects at most 8, got 9",
-                 [&] { record("nine", Tensor::zeros({1}), inputs, [](Backward&) {}); });
+  EXPECT_REFUSAL("nine: inputs expects at most 8, got 9",
+                 record("nine", Tensor::zeros({1}), inputs, [](Backward&) {}));
 }
 
 }  // namespace

@@ -53,8 +53,7 @@ class MemoryTest : public ::testing::Test {
 TEST_F(MemoryTest, LoadingParameters) {
   const TemporaryFolder folder;
   const std::string path = folder / "m.safetensors";
-  Rng rng(1);
-  const SuperTac model(small_settings(), rng);
+  const SuperTac model = random_network();
   save_model(path, model, {}, {});
   const SafetensorsFile file = read_checkpoint(path);
   expect_survival([&] { load_parameters(file, path, model.parameters()); });
@@ -73,8 +72,7 @@ TEST_F(MemoryTest, OneTrainingStep) {
 TEST_F(MemoryTest, InferenceOfNewWindows) {
   SuperTacSettings larger = small_settings();  // than what the pool has kept of the other tests
   larger.timesteps = 128;
-  Rng rng(1);
-  const SuperTac model(larger, rng);
+  const SuperTac model = random_network(larger);
   expect_survival([&] { model.infer(uniform({16, 128, 16}, 1)); });
 }
 

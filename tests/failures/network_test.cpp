@@ -5,7 +5,6 @@
 
 #include "autograd/ops/arithmetic.h"
 #include "layers/residual.h"
-#include "tests/layers/noise.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -39,6 +38,16 @@ double checkerboard(Dim kernel) {
 TEST(Failures, F8KernelThreeDrawsACheckerboardKernelFourDoesNot) {
   EXPECT_GT(checkerboard(3), 0.2);
   EXPECT_LT(checkerboard(4), 0.02);
+}
+
+double variance(const Tensor& t) {
+  double sum = 0, squares = 0;
+  for (const real x : t.values()) {
+    sum += static_cast<double>(x);
+    squares += static_cast<double>(x) * static_cast<double>(x);
+  }
+  const double n = static_cast<double>(t.size()), mean = sum / n;
+  return squares / n - mean * mean;
 }
 
 // Variance after `depth` blocks, relative to what came in. Off: weights as large as He et al. 2015 draw them

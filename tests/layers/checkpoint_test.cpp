@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "layers/convolution.h"
-#include "layers/linear.h"
 #include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 
@@ -25,29 +24,6 @@ Parameter counting(const std::string& name, const Shape& shape, Layout layout) {
   Tensor t(shape);
   std::iota(t.values().begin(), t.values().end(), real(0));
   return {name, Variable(t, true), layout};
-}
-
-TEST(Layout, ConvolutionIsStoredAsOutInKernel) {
-  const StoredTensor s = to_stored(counting("w", {3, 2, 4}, Layout::conv));  // [k,in,out]
-  EXPECT_EQ(s.shape, (std::vector<std::uint64_t>{4, 2, 3}));
-  EXPECT_EQ(s.values[0], 0);  // out 0, in 0, k 0
-  EXPECT_EQ(s.values[1], 8);  // out 0, in 0, k 1 lies one [in,out] plane further
-  EXPECT_EQ(s.values[3], 4);  // out 0, in 1, k 0
-  EXPECT_EQ(s.values[6], 1);  // out 1, in 0, k 0
-}
-
-TEST(Layout, TransposedConvolutionIsStoredAsInOutKernel) {
-  const StoredTensor s = to_stored(counting("w", {2, 2, 3, 4}, Layout::conv_transpose));  // [ky,kx,in,out]
-  EXPECT_EQ(s.shape, (std::vector<std::uint64_t>{3, 4, 2, 2}));
-  EXPECT_EQ(s.values[1], 12);  // in 0, out 0, ky 0, kx 1
-  EXPECT_EQ(s.values[2], 24);  // in 0, out 0, ky 1, kx 0
-  EXPECT_EQ(s.values[4], 1);   // in 0, out 1
-}
-
-TEST(Layout, LinearIsStoredAsOutInAndPointwiseAsAConvolution) {
-  EXPECT_EQ(to_stored(counting("w", {2, 3}, Layout::linear)).values, (std::vector<float>{0, 3, 1, 4, 2, 5}));
-  EXPECT_EQ(to_stored(counting("w", {2, 3}, Layout::pointwise)).shape,
-            (std::vector<std::uint64_t>{3, 2, 1, 1}));
 }
 
 TEST_F(CheckpointTest, ComesBackToTheBit) {

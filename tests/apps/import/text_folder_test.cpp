@@ -102,11 +102,11 @@ TEST(TextFolder, APlateOfUnknownShapeIsImportedWithoutPositions) {
   EXPECT_TRUE(imported[0].summary().ends_with("of unknown shape: no position, no truth"))
       << imported[0].summary();
   WindowSet windows((WindowSettings()));
-  EXPECT_EQ(
-      what_of<std::invalid_argument>([&] { windows.add(recording); }),
+  EXPECT_REFUSAL(
       "these signals have no truth to train on or score. Learn from simulated presses "
       "(supertac-simulate --sensor FILE --presses N), film what presses (supertac-import --truth), or slide "
-      "over a plate that is known (supertac-import --plate NAME)");
+      "over a plate that is known (supertac-import --plate NAME)",
+      windows.add(recording));
 }
 
 TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {

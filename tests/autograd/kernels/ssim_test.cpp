@@ -1,6 +1,7 @@
 // SSIM's traps: flat images, opposite images, values far from zero, small images.
 #include <algorithm>
 
+#include "autograd/ops/arithmetic.h"
 #include "autograd/ops/losses.h"
 #include "tests/autograd/check.h"
 
@@ -58,26 +59,11 @@ TEST(Ssim, IsItsDefinition) {
                              Shape{1, 7, 15, 1}, Shape{1, 11, 11, 1}}) {
     const Tensor x = numbers(shape, 1, 0, 1), y = numbers(shape, 2, 0, 1);
     EXPECT_NEAR(similarity(x, y), by_definition(x, y), kRounding) << shape.text();
+    EXPECT_NEAR(similarity(x, x), 1, kRounding) << shape.text();
   }
-}
-
-TEST(Ssim, IdenticalImagesScoreOne) {
-  for (const Dim size : {7, 8, 16, 32}) {
-    EXPECT_NEAR(similarity(textured(size), textured(size)), 1, kRounding);
-    EXPECT_NEAR(similarity(flat(size, 0), flat(size, 0)), 1, kRounding);
-    EXPECT_NEAR(similarity(flat(size, 0.7), flat(size, 0.7)), 1, kRounding);
-  }
-}
-
-TEST(Ssim, FlatImages) {
   EXPECT_NEAR(similarity(flat(16, 0), flat(16, 1)), kC1 / (1 + kC1), kRounding);
-  EXPECT_NEAR(similarity(flat(16, 0.2), flat(16, 0.6)), (2 * 0.12 + kC1) / (0.04 + 0.36 + kC1),
-              2 * kRounding);
   EXPECT_NEAR(similarity(flat(16, 0.5), textured(16)), by_definition(flat(16, 0.5), textured(16)), kRounding);
-}
-
-TEST(Ssim, OppositeImagesScoreBelowZero) {
-  const Tensor x = textured(16, 0.5, 0.3), opposite = textured(16, 0.5, -0.3);
+  const Tensor x = textured(16), opposite = textured(16, 0.5, -0.3);
   EXPECT_LT(similarity(x, opposite), -0.8);
   EXPECT_NEAR(similarity(x, opposite), by_definition(x, opposite), 5 * kRounding);
 }
@@ -104,21 +90,18 @@ TEST(Ssim, GradientIsFiniteEverywhere) {
 // The all-zero picture against a texture is where training can get stuck: the gradient must not be zero
 // there.
 TEST(Ssim, AFlatPictureIsPulledTowardsTheTexture) {
-  const Variable v = parameter(flat(16, 0));
-  const Tensor target = textured(16);
-  backward(ssim(v, target));
-  EXPECT_GT(dot(v.grad(), target), 1e-2);
+  const Variable v = parameter(flat(16, 0)), target(textured(16));
+  backward(ssim(v, target.value()));
+  EXPECT_GT(sum(Variable(v.grad()) * target).item(), 1e-2);
 }
 
 TEST(Ssim, RefusesOtherShapes) {
   const Variable x(Tensor::zeros({1, 16, 16, 1}));
-  expect_refusal("ssim: x expects rank 4, got [16,16]", [] {
-    ssim(Variable(Tensor::zeros({16, 16})), Tensor::zeros({16, 16}));
-  });
-  expect_refusal("ssim: target expects [1,16,16,1], got [16,16]", [&] { ssim(x, Tensor::zeros({16, 16})); });
+  EXPECT_REFUSAL("ssim: x expects rank 4, got [16,16]", ssim(zeros({16, 16}), Tensor::zeros({16, 16})));
+  EXPECT_REFUSAL("ssim: target expects [1,16,16,1], got [16,16]", ssim(x, Tensor::zeros({16, 16})));
   for (const Shape& bad : {Shape{1, 2, 16, 1}, Shape{1, 16, 16, 2}, Shape{0, 16, 16, 1}}) {
-    expect_refusal("ssim: x expects [N,H,W,1] with H, W >= 3, got " + bad.text(),
-                   [&] { ssim(Variable(Tensor::zeros(bad)), Tensor::zeros(bad)); });
+    EXPECT_REFUSAL("ssim: x expects [N,H,W,1] with H, W >= 3, got " + bad.text(),
+                   ssim(Variable(Tensor::zeros(bad)), Tensor::zeros(bad)));
   }
 }
 

@@ -12,11 +12,11 @@ using namespace test;
 
 TEST(Activations, HandComputed) {
   const Variable x(Tensor::of({4}, {-2, -0.5, 0, 3}));
-  expect_values(relu(x).value(), {4}, {0, 0, 0, 3});
-  expect_values(leaky_relu(x).value(), {4}, {-0.02, -0.005, 0, 3});
-  expect_values(leaky_relu(x, real(0.5)).value(), {4}, {-1, -0.25, 0, 3});
-  expect_values(sigmoid(x).value(), {4}, {0.11920292202211755, 0.3775406687981454, 0.5, 0.9525741268224334});
-  expect_values(clamp(x, -1, 1).value(), {4}, {-1, -0.5, 0, 1});
+  EXPECT_VALUES(relu(x).value(), {4}, {0, 0, 0, 3});
+  EXPECT_VALUES(leaky_relu(x).value(), {4}, {-0.02, -0.005, 0, 3});
+  EXPECT_VALUES(leaky_relu(x, real(0.5)).value(), {4}, {-1, -0.25, 0, 3});
+  EXPECT_VALUES(sigmoid(x).value(), {4}, {0.11920292202211755, 0.3775406687981454, 0.5, 0.9525741268224334});
+  EXPECT_VALUES(clamp(x, -1, 1).value(), {4}, {-1, -0.5, 0, 1});
 }
 
 TEST(Activations, SigmoidNeverOverflows) {
@@ -32,7 +32,7 @@ TEST(Activations, SigmoidNeverOverflows) {
 TEST(Activations, ClampGradientStopsOutsideTheLimits) {
   const Variable x = parameter(Tensor::of({5}, {-11, -10, 0, 10, real(10.001)}));
   backward(sum(clamp(x, -10, 10)));
-  expect_values(x.grad(), {5}, {0, 1, 1, 1, 0});
+  EXPECT_VALUES(x.grad(), {5}, {0, 1, 1, 1, 0});
 }
 
 TEST(Activations, NotANumberStaysVisible) {
@@ -69,9 +69,8 @@ TEST(Activations, Empty) {
 
 TEST(Activations, RefusesBadSettings) {
   const Variable x(Tensor::zeros({1}));
-  expect_refusal("leaky_relu: negative_slope expects 0 or more, got -0.500000",
-                 [&] { leaky_relu(x, real(-0.5)); });
-  expect_refusal("clamp: low expects at most high, 1.000000, got 2.000000", [&] { clamp(x, 2, 1); });
+  EXPECT_REFUSAL("leaky_relu: negative_slope expects 0 or more, got -0.500000", leaky_relu(x, real(-0.5)));
+  EXPECT_REFUSAL("clamp: low expects at most high, 1.000000, got 2.000000", clamp(x, 2, 1));
 }
 
 // f stored by the op itself and f as an op behind it: the same bytes, forwards and backwards.
@@ -112,11 +111,10 @@ TEST(FusedActivation, IsTheActivationBehindTheOp) {
 
 TEST(FusedActivation, RefusesANegativeSlope) {
   const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
-  expect_refusal("linear: negative_slope expects 0 or more, got -0.500000",
-                 [&] { linear(x, w, b, real(-0.5)); });
+  EXPECT_REFUSAL("linear: negative_slope expects 0 or more, got -0.500000", linear(x, w, b, real(-0.5)));
   const Variable line(Tensor::zeros({1, 4, 3})), taps(Tensor::zeros({3, 3, 5}));
-  expect_refusal("conv1d: negative_slope expects 0 or more, got -0.500000",
-                 [&] { conv1d(line, taps, b, {.padding = 1, .negative_slope = real(-0.5)}); });
+  EXPECT_REFUSAL("conv1d: negative_slope expects 0 or more, got -0.500000",
+                 conv1d(line, taps, b, {.padding = 1, .negative_slope = real(-0.5)}));
 }
 
 }  // namespace

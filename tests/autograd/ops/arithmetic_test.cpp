@@ -10,18 +10,18 @@ using namespace test;
 const Tensor kA = Tensor::of({2, 2}, {1, -2, 3, 0}), kB = Tensor::of({2, 2}, {5, 7, -1, 4});
 
 TEST(Arithmetic, HandComputed) {
-  expect_values((Variable(kA) + Variable(kB)).value(), {2, 2}, {6, 5, 2, 4});
-  expect_values((Variable(kA) * Variable(kB)).value(), {2, 2}, {5, -14, -3, 0});
-  expect_values((Variable(kA) - Variable(kB)).value(), {2, 2}, {-4, -9, 4, -4});
-  expect_values((-2 * Variable(kA)).value(), {2, 2}, {-2, 4, -6, 0});
-  expect_values((1 - Variable(kA)).value(), {2, 2}, {0, 3, -2, 1});
-  expect_values(sum(Variable(kA)).value(), {}, {2});
+  EXPECT_VALUES((Variable(kA) + Variable(kB)).value(), {2, 2}, {6, 5, 2, 4});
+  EXPECT_VALUES((Variable(kA) * Variable(kB)).value(), {2, 2}, {5, -14, -3, 0});
+  EXPECT_VALUES((Variable(kA) - Variable(kB)).value(), {2, 2}, {-4, -9, 4, -4});
+  EXPECT_VALUES((-2 * Variable(kA)).value(), {2, 2}, {-2, 4, -6, 0});
+  EXPECT_VALUES((1 - Variable(kA)).value(), {2, 2}, {0, 3, -2, 1});
+  EXPECT_VALUES(sum(Variable(kA)).value(), {}, {2});
 }
 
 TEST(Arithmetic, OneVariableMayBeBothArguments) {
   const Variable x = parameter(kA);
   backward(sum(x * x + (x + x)));
-  expect_values(x.grad(), {2, 2}, {4, -2, 8, 2});
+  EXPECT_VALUES(x.grad(), {2, 2}, {4, -2, 8, 2});
 }
 
 TEST(Arithmetic, SumOfManyKeepsItsDigits) {
@@ -38,10 +38,10 @@ TEST(Arithmetic, Empty) {
 
 TEST(Arithmetic, RefusesOtherShapes) {
   const Variable a(Tensor::zeros({2, 3})), b(Tensor::zeros({3, 2}));
-  expect_refusal("add: b expects the shape of a, [2,3], got [3,2]", [&] { a + b; });
-  expect_refusal("multiply: b expects the shape of a, [2,3], got [3,2]", [&] { a* b; });
-  expect_refusal("subtract: b expects the shape of a, [2,3], got [3,2]", [&] { a - b; });
-  expect_refusal("subtract: x expects a value, got an empty Variable", [] { 1 - Variable(); });
+  EXPECT_REFUSAL("add: b expects the shape of a, [2,3], got [3,2]", a + b);
+  EXPECT_REFUSAL("multiply: b expects the shape of a, [2,3], got [3,2]", a * b);
+  EXPECT_REFUSAL("subtract: b expects the shape of a, [2,3], got [3,2]", a - b);
+  EXPECT_REFUSAL("subtract: x expects a value, got an empty Variable", 1 - Variable());
 }
 
 }  // namespace

@@ -13,9 +13,9 @@ using namespace test;
 
 TEST(Attention, HandComputed) {
   const Variable x(Tensor::of({1, 2, 2, 2}, {1, 10, 2, 20, 3, 30, 6, 0}));
-  expect_values(global_mean(x).value(), {1, 2}, {3, 15});
+  EXPECT_VALUES(global_mean(x).value(), {1, 2}, {3, 15});
   const Variable a(Tensor::of({1, 2, 2, 2}, {100, 0, 0, 0, 0, 0, 0, 5})), s(Tensor::of({1, 2}, {2, -1}));
-  expect_values(gated_sum(a, x, s).value(), {1, 2, 2, 2}, {102, -10, 4, -20, 6, -30, 12, 5});
+  EXPECT_VALUES(gated_sum(a, x, s).value(), {1, 2, 2, 2}, {102, -10, 4, -20, 6, -30, 12, 5});
 }
 
 // Two images of two pixels and one channel: gradients are added, set or left out as their slots say.
@@ -52,16 +52,11 @@ TEST(Attention, Empty) {
 
 TEST(Attention, RefusesOtherShapes) {
   const Variable x(Tensor::zeros({2, 4, 4, 3})), flat(Tensor::zeros({2, 3}));
-  expect_refusal("global_mean: x expects rank 4, got [2,3]", [&] { global_mean(flat); });
-  expect_refusal("global_mean: x expects a pixel or more, got [2,0,4,3]", [] {
-    global_mean(Variable(Tensor::zeros({2, 0, 4, 3})));
-  });
-  expect_refusal("gated_sum: x expects rank 4, got [2,3]", [&] { gated_sum(flat, flat, flat); });
-  expect_refusal("gated_sum: x expects the shape of a, [2,3], got [2,4,4,3]",
-                 [&] { gated_sum(flat, x, flat); });
-  expect_refusal("gated_sum: s expects [2,3], got [3,2]", [&] {
-    gated_sum(x, x, Variable(Tensor::zeros({3, 2})));
-  });
+  EXPECT_REFUSAL("global_mean: x expects rank 4, got [2,3]", global_mean(flat));
+  EXPECT_REFUSAL("global_mean: x expects a pixel or more, got [2,0,4,3]", global_mean(zeros({2, 0, 4, 3})));
+  EXPECT_REFUSAL("gated_sum: x expects rank 4, got [2,3]", gated_sum(flat, flat, flat));
+  EXPECT_REFUSAL("gated_sum: x expects the shape of a, [2,3], got [2,4,4,3]", gated_sum(flat, x, flat));
+  EXPECT_REFUSAL("gated_sum: s expects [2,3], got [3,2]", gated_sum(x, x, zeros({3, 2})));
 }
 
 }  // namespace

@@ -11,15 +11,15 @@ using namespace test;
 TEST(Conv1d, HandComputed) {
   const Variable x(Tensor::of({1, 4, 1}, {1, 2, 3, 4})), w(Tensor::of({3, 1, 1}, {1, 10, 100}));
   const Variable b(Tensor::of({1}, {1000}));
-  expect_values(conv1d(x, w, b, {.padding = 1}).value(), {1, 4, 1}, {1210, 1321, 1432, 1043});
-  expect_values(conv1d(x, w, b, {.stride = 2, .padding = 1}).value(), {1, 2, 1}, {1210, 1432});
+  EXPECT_VALUES(conv1d(x, w, b, {.padding = 1}).value(), {1, 4, 1}, {1210, 1321, 1432, 1043});
+  EXPECT_VALUES(conv1d(x, w, b, {.stride = 2, .padding = 1}).value(), {1, 2, 1}, {1210, 1432});
 }
 
 TEST(ConvTranspose1d, HandComputed) {
   const Variable x(Tensor::of({1, 2, 1}, {1, 2})), w(Tensor::of({4, 1, 1}, {1, 10, 100, 1000}));
   const Variable b(Tensor::of({1}, {0}));
-  expect_values(conv_transpose1d(x, w, b, {.stride = 2}).value(), {1, 6, 1}, {1, 10, 102, 1020, 200, 2000});
-  expect_values(conv_transpose1d(x, w, b, {.stride = 2, .padding = 1}).value(), {1, 4, 1},
+  EXPECT_VALUES(conv_transpose1d(x, w, b, {.stride = 2}).value(), {1, 6, 1}, {1, 10, 102, 1020, 200, 2000});
+  EXPECT_VALUES(conv_transpose1d(x, w, b, {.stride = 2, .padding = 1}).value(), {1, 4, 1},
                 {10, 102, 1020, 200});
 }
 
@@ -47,35 +47,32 @@ TEST(Conv, AnEmptyBatchIsFine) {
 TEST(Conv, RefusesWithNames) {
   const Variable x(Tensor::zeros({4, 40, 40, 3})), w(Tensor::zeros({3, 3, 8, 16})), b(Tensor::zeros({16}));
   const Variable w3(Tensor::zeros({3, 3, 3, 16})), flat(Tensor::zeros({2, 3}));
-  expect_refusal("conv2d: x expects rank 4, got [2,3]", [&] { conv2d(flat, w, b, {}); });
-  expect_refusal("conv1d: x expects rank 3, got [4,40,40,3]", [&] { conv1d(x, w, b, {}); });
-  expect_refusal("conv2d: w expects rank 4, got [2,3]", [&] { conv2d(x, flat, b, {}); });
-  expect_refusal("conv2d: x expects 8 channels, as w [3,3,8,16], got [4,40,40,3]",
-                 [&] { conv2d(x, w, b, {}); });
-  expect_refusal("conv_transpose2d: x expects 8 channels, as w [3,3,8,16], got [4,40,40,3]",
-                 [&] { conv_transpose2d(x, w, b, {}); });
-  expect_refusal("conv2d: w expects 1 to 4096 channels, got [3,3,0,2]", [&] {
-    conv2d(Variable(Tensor::zeros({1, 3, 3, 0})), Variable(Tensor::zeros({3, 3, 0, 2})), b, {});
-  });
-  expect_refusal("conv2d: w expects a kernel of 1 or more, got [3,0,3,16]", [&] {
-    conv2d(x, Variable(Tensor::zeros({3, 0, 3, 16})), b, {.padding = 1});
-  });
-  expect_refusal("conv2d: b expects [16], got [2,3]", [&] { conv2d(x, w3, flat, {}); });
-  expect_refusal("conv2d: stride expects 1 or more, got 0", [&] { conv2d(x, w3, b, {.stride = 0}); });
-  expect_refusal("conv2d: padding expects 0 or more, got -1", [&] { conv2d(x, w3, b, {.padding = -1}); });
+  EXPECT_REFUSAL("conv2d: x expects rank 4, got [2,3]", conv2d(flat, w, b, {}));
+  EXPECT_REFUSAL("conv1d: x expects rank 3, got [4,40,40,3]", conv1d(x, w, b, {}));
+  EXPECT_REFUSAL("conv2d: w expects rank 4, got [2,3]", conv2d(x, flat, b, {}));
+  EXPECT_REFUSAL("conv2d: x expects 8 channels, as w [3,3,8,16], got [4,40,40,3]", conv2d(x, w, b, {}));
+  EXPECT_REFUSAL("conv_transpose2d: x expects 8 channels, as w [3,3,8,16], got [4,40,40,3]",
+                 conv_transpose2d(x, w, b, {}));
+  EXPECT_REFUSAL("conv2d: w expects 1 to 4096 channels, got [3,3,0,2]",
+                 conv2d(zeros({1, 3, 3, 0}), zeros({3, 3, 0, 2}), b, {}));
+  EXPECT_REFUSAL("conv2d: w expects a kernel of 1 or more, got [3,0,3,16]",
+                 conv2d(x, zeros({3, 0, 3, 16}), b, {.padding = 1}));
+  EXPECT_REFUSAL("conv2d: b expects [16], got [2,3]", conv2d(x, w3, flat, {}));
+  EXPECT_REFUSAL("conv2d: stride expects 1 or more, got 0", conv2d(x, w3, b, {.stride = 0}));
+  EXPECT_REFUSAL("conv2d: padding expects 0 or more, got -1", conv2d(x, w3, b, {.padding = -1}));
 }
 
 TEST(Conv, RefusesEmptyOutputs) {
   const Variable x(Tensor::zeros({1, 2, 2, 3})), w(Tensor::zeros({3, 3, 3, 4})), b(Tensor::zeros({4}));
-  expect_refusal(
+  EXPECT_REFUSAL(
       "conv2d: x expects pixels for an output of 1 or more with w [3,3,3,4], stride 1 and padding 0, got "
       "[1,2,2,3]",
-      [&] { conv2d(x, w, b, {}); });
-  expect_refusal(
+      conv2d(x, w, b, {}));
+  EXPECT_REFUSAL(
       "conv_transpose2d: x expects pixels for an output of 1 or more with w [3,3,3,4], stride 1 and padding "
       "2, "
       "got [1,2,2,3]",
-      [&] { conv_transpose2d(x, w, b, {.padding = 2}); });
+      conv_transpose2d(x, w, b, {.padding = 2}));
 }
 
 }  // namespace

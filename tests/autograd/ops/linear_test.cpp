@@ -11,7 +11,7 @@ using namespace test;
 TEST(Linear, HandComputed) {
   const Variable x(Tensor::of({2, 2}, {1, 2, 3, 4})), w(Tensor::of({2, 3}, {1, 0, -1, 2, 1, 0}));
   const Variable b(Tensor::of({3}, {10, 20, 30}));
-  expect_values(linear(x, w, b).value(), {2, 3}, {15, 22, 29, 21, 24, 27});
+  EXPECT_VALUES(linear(x, w, b).value(), {2, 3}, {15, 22, 29, 21, 24, 27});
 }
 
 TEST(Linear, Empty) {
@@ -27,14 +27,12 @@ TEST(Linear, Empty) {
 
 TEST(Linear, RefusesOtherShapes) {
   const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
-  expect_refusal("linear: x expects a value, got an empty Variable",
-                 [] { linear(Variable(), Variable(), Variable()); });
-  expect_refusal("linear: x expects rank 2, got [5]", [&] { linear(b, w, b); });
-  expect_refusal("linear: w expects rank 2, got [5]", [&] { linear(x, b, b); });
-  expect_refusal("linear: x expects 5 columns, as w [5,3], got [2,3]", [&] {
-    linear(x, Variable(Tensor::zeros({5, 3})), b);
-  });
-  expect_refusal("linear: b expects [5], got [3]", [&] { linear(x, w, Variable(Tensor::zeros({3}))); });
+  EXPECT_REFUSAL("linear: x expects a value, got an empty Variable",
+                 linear(Variable(), Variable(), Variable()));
+  EXPECT_REFUSAL("linear: x expects rank 2, got [5]", linear(b, w, b));
+  EXPECT_REFUSAL("linear: w expects rank 2, got [5]", linear(x, b, b));
+  EXPECT_REFUSAL("linear: x expects 5 columns, as w [5,3], got [2,3]", linear(x, zeros({5, 3}), b));
+  EXPECT_REFUSAL("linear: b expects [5], got [3]", linear(x, w, zeros({3})));
 }
 
 }  // namespace

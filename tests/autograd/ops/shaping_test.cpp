@@ -18,9 +18,9 @@ Variable unflattened(const Variable& x, std::initializer_list<Dim> pixels) {
 
 TEST(Shaping, HandComputed) {
   const Variable x(Tensor::of({2, 3}, {1, 2, 3, 4, 5, 6})), y(Tensor::of({2, 1}, {7, 8}));
-  expect_values(joined({x, y}).value(), {2, 4}, {1, 2, 3, 7, 4, 5, 6, 8});
+  EXPECT_VALUES(joined({x, y}).value(), {2, 4}, {1, 2, 3, 7, 4, 5, 6, 8});
   const Variable pixels(Tensor::of({1, 2, 3}, {1, 10, 100, 2, 20, 200}));  // [N,L,C]
-  expect_values(flatten_channels_first(pixels).value(), {1, 6}, {1, 2, 10, 20, 100, 200});
+  EXPECT_VALUES(flatten_channels_first(pixels).value(), {1, 6}, {1, 2, 10, 20, 100, 200});
 }
 
 TEST(Shaping, UnflattenUndoesFlatten) {
@@ -32,7 +32,7 @@ TEST(Shaping, UnflattenUndoesFlatten) {
 
 TEST(Shaping, OneAxisIsEnoughToJoin) {
   const Variable joint = joined({Variable(Tensor::of({2}, {1, 2})), Variable(Tensor::of({1}, {3}))});
-  expect_values(joint.value(), {3}, {1, 2, 3});
+  EXPECT_VALUES(joint.value(), {3}, {1, 2, 3});
 }
 
 TEST(Shaping, Empty) {
@@ -53,64 +53,52 @@ TEST(Shaping, Empty) {
 TEST(Shaping, TakesRunsOfColumns) {
   const Variable x(Tensor::of({2, 6}, {0, 1, 2, 3, 4, 5, 10, 11, 12, 13, 14, 15}));
   const Variable y = take_runs(x, {.first = 1, .run = 2, .step = 3, .width = 4});
-  expect_values(y.value(), {2, 4}, {1, 2, 4, 5, 11, 12, 14, 15});
-  expect_refusal("take_runs: x expects 7 columns or more, got [2,6]", [&] { take_runs(x, {2, 2, 3, 4}); });
+  EXPECT_VALUES(y.value(), {2, 4}, {1, 2, 4, 5, 11, 12, 14, 15});
+  EXPECT_REFUSAL("take_runs: x expects 7 columns or more, got [2,6]", take_runs(x, {2, 2, 3, 4}));
   const std::string runs =
       "take_runs: runs expects first >= 0, run >= 1, step >= run and width a multiple of run, got ";
-  expect_refusal(runs + "-1, 2, 3 and 4", [&] { take_runs(x, {-1, 2, 3, 4}); });
-  expect_refusal(runs + "0, 0, 3 and 4", [&] { take_runs(x, {0, 0, 3, 4}); });
-  expect_refusal(runs + "0, 2, 1 and 4", [&] { take_runs(x, {0, 2, 1, 4}); });
-  expect_refusal(runs + "0, 2, 2 and 3", [&] { take_runs(x, {0, 2, 2, 3}); });
-  expect_refusal("take_runs: x expects rank 1 or more, got []", [] {
-    take_runs(Variable(Tensor::zeros({})), {0, 1, 1, 1});
-  });
-  expect_refusal("take_runs: x expects a constant, got a variable that requires a gradient", [&] {
-    take_runs(Variable(Tensor::zeros({2, 6}), true), {0, 2, 2, 4});
-  });
+  EXPECT_REFUSAL(runs + "-1, 2, 3 and 4", take_runs(x, {-1, 2, 3, 4}));
+  EXPECT_REFUSAL(runs + "0, 0, 3 and 4", take_runs(x, {0, 0, 3, 4}));
+  EXPECT_REFUSAL(runs + "0, 2, 1 and 4", take_runs(x, {0, 2, 1, 4}));
+  EXPECT_REFUSAL(runs + "0, 2, 2 and 3", take_runs(x, {0, 2, 2, 3}));
+  EXPECT_REFUSAL("take_runs: x expects rank 1 or more, got []", take_runs(zeros({}), {0, 1, 1, 1}));
+  EXPECT_REFUSAL("take_runs: x expects a constant, got a variable that requires a gradient",
+                 take_runs(Variable(Tensor::zeros({2, 6}), true), {0, 2, 2, 4}));
 }
 
 TEST(Shaping, TakesTheLastFrameOfEachWindow) {
   const Variable x(Tensor::of({2, 2, 2}, {0, 1, 2, 3, 10, 11, 12, 13}));
-  expect_values(last_frame(x, 1, 2, 1).value(), {2, 1, 2, 1}, {2, 3, 12, 13});
-  expect_refusal("last_frame: windows expects rank 3, got [2,4]", [] {
-    last_frame(Variable(Tensor::zeros({2, 4})), 1, 2, 1);
-  });
-  expect_refusal("last_frame: windows expects [2,2,6], got [2,2,2]", [&] { last_frame(x, 3, 2, 1); });
-  expect_refusal("last_frame: rows expects 1 or more, got -1", [&] { last_frame(x, -1, -2, 1); });
-  expect_refusal("last_frame: columns expects 1 or more, got -2", [&] { last_frame(x, 1, -2, 1); });
-  expect_refusal("last_frame: channels expects 1 or more, got 0", [&] { last_frame(x, 1, 2, 0); });
-  expect_refusal("last_frame: windows expects a constant, got a variable that requires a gradient", [&] {
-    last_frame(Variable(Tensor::zeros({1, 2, 2}), true), 1, 2, 1);
-  });
+  EXPECT_VALUES(last_frame(x, 1, 2, 1).value(), {2, 1, 2, 1}, {2, 3, 12, 13});
+  EXPECT_REFUSAL("last_frame: windows expects rank 3, got [2,4]", last_frame(zeros({2, 4}), 1, 2, 1));
+  EXPECT_REFUSAL("last_frame: windows expects [2,2,6], got [2,2,2]", last_frame(x, 3, 2, 1));
+  EXPECT_REFUSAL("last_frame: rows expects 1 or more, got -1", last_frame(x, -1, -2, 1));
+  EXPECT_REFUSAL("last_frame: columns expects 1 or more, got -2", last_frame(x, 1, -2, 1));
+  EXPECT_REFUSAL("last_frame: channels expects 1 or more, got 0", last_frame(x, 1, 2, 0));
+  EXPECT_REFUSAL("last_frame: windows expects a constant, got a variable that requires a gradient",
+                 last_frame(Variable(Tensor::zeros({1, 2, 2}), true), 1, 2, 1));
 }
 
 TEST(Shaping, RefusesWhatDoesNotFit) {
   const Variable x(Tensor::zeros({2, 3})), scalar(Tensor::zeros({}));
-  expect_refusal("concat: xs expects 1 to 8 inputs, got 0", [] { joined({}); });
-  expect_refusal("concat: xs expects 1 to 8 inputs, got 9", [&] { joined(std::vector<Variable>(9, x)); });
-  expect_refusal("concat: x0 expects rank 1 or more, got []", [&] { joined({scalar}); });
-  expect_refusal("concat: x1 expects [2,4], got [3,4]", [&] {
-    joined({x, Variable(Tensor::zeros({3, 4}))});
-  });
-  expect_refusal("flatten_channels_first: x expects rank 3 or 4, got [2,3]",
-                 [&] { flatten_channels_first(x); });
-  expect_refusal("unflatten_channels_first: x expects rank 2, got []", [&] { unflattened(scalar, {1}); });
-  expect_refusal("unflatten_channels_first: pixels expects {L} or {H,W}, got 3 sizes", [&] {
-    unflattened(x, {1, 1, 1});
-  });
-  expect_refusal("unflatten_channels_first: x expects a multiple of 2 columns, got [2,3]",
-                 [&] { unflattened(x, {2}); });
-  expect_refusal("unflatten_channels_first: pixels expects 1 or more, got -3", [&] {
-    unflattened(x, {-3, -1});
-  });
+  EXPECT_REFUSAL("concat: xs expects 1 to 8 inputs, got 0", joined({}));
+  EXPECT_REFUSAL("concat: xs expects 1 to 8 inputs, got 9", joined(std::vector<Variable>(9, x)));
+  EXPECT_REFUSAL("concat: x0 expects rank 1 or more, got []", joined({scalar}));
+  EXPECT_REFUSAL("concat: x1 expects [2,4], got [3,4]", joined({x, zeros({3, 4})}));
+  EXPECT_REFUSAL("flatten_channels_first: x expects rank 3 or 4, got [2,3]", flatten_channels_first(x));
+  EXPECT_REFUSAL("unflatten_channels_first: x expects rank 2, got []", unflattened(scalar, {1}));
+  EXPECT_REFUSAL("unflatten_channels_first: pixels expects {L} or {H,W}, got 3 sizes",
+                 unflattened(x, {1, 1, 1}));
+  EXPECT_REFUSAL("unflatten_channels_first: x expects a multiple of 2 columns, got [2,3]",
+                 unflattened(x, {2}));
+  EXPECT_REFUSAL("unflatten_channels_first: pixels expects 1 or more, got -3", unflattened(x, {-3, -1}));
 }
 
 TEST(MaxPool, HandComputedAndAnOddRowIsLeftOut) {
   const Variable x = parameter(Tensor::of({1, 3, 4, 1}, {1, 5, 2, 2, 3, 4, 2, 2, 9, 9, 9, 9}));
   const Variable y = max_pool2d(x);
-  expect_values(y.value(), {1, 1, 2, 1}, {5, 2});
+  EXPECT_VALUES(y.value(), {1, 1, 2, 1}, {5, 2});
   backward(sum(y));  // among equal values the first gets the gradient, once
-  expect_values(x.grad(), {1, 3, 4, 1}, {0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  EXPECT_VALUES(x.grad(), {1, 3, 4, 1}, {0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0});
 }
 
 TEST(MaxPool, ANanComesOutWhereverItLies) {
@@ -129,12 +117,8 @@ TEST(MaxPool, Empty) {
 }
 
 TEST(MaxPool, RefusesOtherShapes) {
-  expect_refusal("max_pool2d: x expects rank 4, got [4,4]", [] {
-    max_pool2d(Variable(Tensor::zeros({4, 4})));
-  });
-  expect_refusal("max_pool2d: x expects H, W >= 2, got [1,1,4,3]", [] {
-    max_pool2d(Variable(Tensor::zeros({1, 1, 4, 3})));
-  });
+  EXPECT_REFUSAL("max_pool2d: x expects rank 4, got [4,4]", max_pool2d(zeros({4, 4})));
+  EXPECT_REFUSAL("max_pool2d: x expects H, W >= 2, got [1,1,4,3]", max_pool2d(zeros({1, 1, 4, 3})));
 }
 
 }  // namespace

@@ -80,10 +80,10 @@ TEST(Adam, NonFiniteGradientsLeaveEverythingUnchanged) {
     handle_b.mutable_grad().data()[1] = static_cast<real>(bad);
     EXPECT_FALSE(std::isfinite(adam.step()));
     EXPECT_EQ(adam.steps(), 0);
-    expect_values(a.value(), {3}, {1, 1, 1});
-    expect_values(b.value(), {2}, {2, 2});
-    expect_values(adam.first_moments()[0], {3}, {0, 0, 0});
-    expect_values(adam.second_moments()[0], {3}, {0, 0, 0});
+    EXPECT_VALUES(a.value(), {3}, {1, 1, 1});
+    EXPECT_VALUES(b.value(), {2}, {2, 2});
+    EXPECT_VALUES(adam.first_moments()[0], {3}, {0, 0, 0});
+    EXPECT_VALUES(adam.second_moments()[0], {3}, {0, 0, 0});
   }
 }
 
@@ -104,11 +104,11 @@ TEST(Adam, RefusesAStepWithoutAGradient) {
   Variable x = parameter(Tensor::zeros({2, 3}));
   Adam adam({x}, {});
   x.drop_grad();
-  expect_refusal("Adam: parameter 0 expects a gradient [2,3], got none; run backward() before step()",
-                 [&] { adam.step(); });
+  EXPECT_REFUSAL("Adam: parameter 0 expects a gradient [2,3], got none; run backward() before step()",
+                 adam.step());
   x.mutable_grad() = Tensor::zeros({2});
-  expect_refusal("Adam: parameter 0 expects a gradient [2,3], got [2]; run backward() before step()",
-                 [&] { adam.step(); });
+  EXPECT_REFUSAL("Adam: parameter 0 expects a gradient [2,3], got [2]; run backward() before step()",
+                 adam.step());
 }
 
 TEST(Adam, RefusesBadOptions) {
@@ -120,11 +120,10 @@ TEST(Adam, RefusesBadOptions) {
         {AdamOptions{.beta2 = -0.1}, "beta2 expects a number in [0,1), got -0.100000"},
         {AdamOptions{.epsilon = 0}, "epsilon expects more than 0, got 0.000000"},
         {AdamOptions{.clip_norm = -1}, "clip_norm expects 0 or more, got -1.000000"}}) {
-    expect_refusal("Adam: " + std::string(text),
-                   [&, o = options] { Adam({parameter(Tensor::zeros({1}))}, o); });
+    const AdamOptions& bad = options;
+    EXPECT_REFUSAL("Adam: " + std::string(text), Adam({parameter(Tensor::zeros({1}))}, bad));
   }
-  expect_refusal("Adam: parameter 0 expects to require a gradient, got a constant",
-                 [] { Adam({Variable(Tensor::zeros({1}))}, {}); });
+  EXPECT_REFUSAL("Adam: parameter 0 expects to require a gradient, got a constant", Adam({zeros({1})}, {}));
 }
 
 TEST(Muon, MovesMatricesAlongTheOrthogonalFactorAndTheRestAsAdam) {

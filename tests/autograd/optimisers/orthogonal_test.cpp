@@ -1,5 +1,6 @@
 #include "autograd/optimisers/adam.h"
 
+#include <numeric>
 #include <vector>
 
 #include "tests/autograd/check.h"
@@ -10,33 +11,24 @@ namespace {
 using namespace test;
 using Matrix = std::vector<double>;
 
-Matrix product(Dim n, Dim k, Dim m, const Matrix& a, const Matrix& b) {
+// a [n,k] times b [k,m], or times the transposed of b [m,k].
+Matrix product(Dim n, Dim k, Dim m, const Matrix& a, const Matrix& b, bool transposed = false) {
   Matrix y(static_cast<std::size_t>(n * m));
-  for (Dim i = 0; i < n; ++i) {
-    for (Dim j = 0; j < m; ++j) {
-      for (Dim l = 0; l < k; ++l)
-        y[static_cast<std::size_t>(i * m + j)] +=
-            a[static_cast<std::size_t>(i * k + l)] * b[static_cast<std::size_t>(l * m + j)];
+  for (Dim i = 0; i < n * m; ++i)
+    for (Dim l = 0; l < k; ++l) {
+      const Dim of_b = transposed ? i % m * k + l : l * m + i % m;
+      y[static_cast<std::size_t>(i)] +=
+          a[static_cast<std::size_t>(i / m * k + l)] * b[static_cast<std::size_t>(of_b)];
     }
-  }
-  return y;
-}
-Matrix transposed(Dim rows, Dim columns, const Matrix& x) {
-  Matrix y(x.size());
-  for (Dim i = 0; i < rows; ++i) {
-    for (Dim j = 0; j < columns; ++j)
-      y[static_cast<std::size_t>(j * rows + i)] = x[static_cast<std::size_t>(i * columns + j)];
-  }
   return y;
 }
 
 // The steps as the header has them, on x itself, in double precision.
 Matrix reference(Dim rows, Dim columns, Matrix x) {
-  double squares = 0;
-  for (const double v : x) squares += v * v;
-  for (double& v : x) v /= std::sqrt(squares) + 1e-7;
+  const double length = std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0));
+  for (double& v : x) v /= length + 1e-7;
   for (int step = 0; step < 5; ++step) {
-    const Matrix s = product(rows, columns, rows, x, transposed(rows, columns, x));
+    const Matrix s = product(rows, columns, rows, x, x, true);
     const Matrix sx = product(rows, rows, columns, s, x), ssx = product(rows, rows, columns, s, sx);
     for (std::size_t i = 0; i < x.size(); ++i) x[i] = 3.4445 * x[i] - 4.7750 * sx[i] + 2.0315 * ssx[i];
   }

@@ -49,8 +49,7 @@ void expect_refused(const std::vector<std::string>& paths, const std::string& wh
 }
 
 TEST(Ensemble, SaysWhichModelsDoNotBelongTogether) {
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Ensemble({}); }),
-            "Ensemble: expected at least one network, got none");
+  EXPECT_REFUSAL("Ensemble: expected at least one network, got none", Ensemble({}));
   const TemporaryFolder folder;
   const auto saved = [&](const char* name, const SuperTacSettings& settings, double rate_hz = 300,
                          const std::map<std::string, std::string>& metadata = {}) {
@@ -76,12 +75,10 @@ TEST(Ensemble, RefusesNetworksOfOtherInputs) {
   SuperTacSettings twice_as_long = small_settings();
   twice_as_long.timesteps = 64;
   const SuperTac one = random_network(), longer = random_network(twice_as_long);
-  EXPECT_EQ(
-      what_of<std::invalid_argument>([&] {
-        Ensemble({CompiledModel(one), CompiledModel(longer)});
-      }),
+  EXPECT_REFUSAL(
       "Ensemble: expected networks of one format, got one of 32 frame(s) of 4x4 taxels with 1 channel(s) and "
-      "pictures of 8x8 and one of 64 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8");
+      "pictures of 8x8 and one of 64 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8",
+      Ensemble({CompiledModel(one), CompiledModel(longer)}));
 }
 
 }  // namespace

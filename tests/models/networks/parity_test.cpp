@@ -15,7 +15,6 @@ namespace supertac {
 namespace {
 
 using test::counter_numbers;
-using test::Difference;
 using test::doubles;
 using test::stored;
 
@@ -37,49 +36,28 @@ std::vector<double> sampled(const std::vector<double>& values) {
   return kept;
 }
 
-/// Collects the worst differences of a test and prints them.
-class Comparison {
- public:
-  explicit Comparison(double tolerance = 1e-5) : tolerance_(tolerance) {}
-  ~Comparison() {
-    std::printf("  worst difference: %.2e by entry (%s), %.2e by tensor (%s)\n", worst_.by_entry,
-                entry_name_.c_str(), worst_.by_tensor, tensor_name_.c_str());
-  }
-  Comparison(const Comparison&) = delete;
-  Comparison& operator=(const Comparison&) = delete;
+void expect_near(const std::string& name, std::span<const double> found, std::span<const double> expected,
+                 double tolerance = 1e-5) {
+  const test::Difference d = test::difference(found, expected);
+  EXPECT_LE(kDouble ? d.by_entry : d.by_tensor, tolerance) << name << ", " << d.worst;
+}
+void expect_stored(const std::string& name, std::span<const double> found, double tolerance = 1e-5) {
+  expect_near(name, found, stored(reference(), name), tolerance);
+}
 
-  void expect(const std::string& name, std::span<const double> found) {
-    expect(name, found, stored(reference(), name));
+/// A gradient or change of a parameter: every 13th entry of a long one, in PyTorch's order, and a weighted
+/// sum over all, which is judged against the size that such a sum of random signs has.
+void expect_sampled(const std::string& name, const std::vector<double>& values, double tolerance = 1e-5) {
+  expect_stored(name, sampled(values), tolerance);
+  const std::vector<double> weights =
+      counter_numbers(name.substr(name.find('.', 6) + 1) + ".projection", values.size());
+  double sum = 0, squares = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    sum += values[i] * weights[i];
+    squares += values[i] * values[i] / 3;
   }
-  void expect(const std::string& name, std::span<const double> found, std::span<const double> expected) {
-    const Difference d = test::difference(found, expected);
-    EXPECT_LE(kDouble ? d.by_entry : d.by_tensor, tolerance_) << name << ", " << d.worst;
-    if (d.by_entry > worst_.by_entry) entry_name_ = name, worst_.by_entry = d.by_entry;
-    if (d.by_tensor > worst_.by_tensor) tensor_name_ = name, worst_.by_tensor = d.by_tensor;
-  }
-
-  /// A gradient or change of a parameter: every 13th entry of a long one, and a weighted sum over all, which
-  /// is judged against the size that such a sum of random signs has.
-  void expect_sampled(const std::string& name, const std::vector<double>& values) {
-    const bool of_part = values.size() > kSampleAbove;
-    expect(name + (of_part ? " (every 13th element, in PyTorch's order)" : ""), sampled(values),
-           stored(reference(), name));
-    const std::vector<double> weights =
-        counter_numbers(name.substr(name.find('.', 6) + 1) + ".projection", values.size());
-    double sum = 0, squares = 0;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      sum += values[i] * weights[i];
-      squares += values[i] * values[i] / 3;
-    }
-    EXPECT_NEAR(sum, stored(reference(), name + ".projection").at(0), tolerance_ * std::sqrt(squares))
-        << name;
-  }
-
- private:
-  double tolerance_;
-  Difference worst_;
-  std::string entry_name_, tensor_name_;
-};
+  EXPECT_NEAR(sum, stored(reference(), name + ".projection").at(0), tolerance * std::sqrt(squares)) << name;
+}
 
 Tensor tensor(const Shape& shape, const std::vector<double>& values, std::size_t from = 0) {
   Tensor t(shape);
@@ -137,7 +115,7 @@ Loss loss_of(const SuperTac::Output& out) {
   return supertac_loss(out, truth, {.a = 0.5, .beta = 1e-3, .lambda = 0.1});
 }
 
-void expect_outputs(Comparison& compare, const std::string& prefix, const SuperTac::Output& out) {
+void expect_outputs(const std::string& prefix, const SuperTac::Output& out) {
   std::map<std::string, std::vector<double>> joined;
   const auto append = [&](const std::string& name, const Variable& v) {
     for (const real x : v.value().values()) joined[name].push_back(static_cast<double>(x));
@@ -149,37 +127,33 @@ void expect_outputs(Comparison& compare, const std::string& prefix, const SuperT
   }
   append("sr", out.picture);
   append("spread", out.predicted_error);
-  for (const auto& [name, values] : joined) compare.expect(prefix + "." + name, values);
+  for (const auto& [name, values] : joined) expect_stored(prefix + "." + name, values);
 }
 
 TEST(Parity, OutputsAndLossTerms) {
-  Comparison compare;
   const SuperTac::Output out = make_model(kTimesteps, kLatent).forward(small_windows(), eps_of_step(0));
-  expect_outputs(compare, "small", out);
+  expect_outputs("small", out);
   const Loss loss = loss_of(out);
   const std::pair<const char*, Variable> terms[] = {
       {"total", loss.total}, {"reconstruction", loss.reconstruction},  {"kld", loss.kld}, {"l2", loss.l2},
       {"ssim", loss.ssim},   {"predicted_error", loss.predicted_error}};
   for (const auto& [name, term] : terms)
-    compare.expect(std::string("small.loss.") + name, doubles(term.value()));
+    expect_stored(std::string("small.loss.") + name, doubles(term.value()));
 }
 
 TEST(Parity, EveryGradient) {
-  Comparison compare;
   const SuperTac model = make_model(kTimesteps, kLatent);
   backward(loss_of(model.forward(small_windows(), eps_of_step(0))).total);
   for (const Parameter& p : model.parameters()) {
-    compare.expect_sampled("small.grad." + p.name, in_file_order(p, p.value.grad()));
+    expect_sampled("small.grad." + p.name, in_file_order(p, p.value.grad()));
   }
-}
-
-TEST(Parity, TheModelHasExactlyTheNamedParameters) {
-  const SuperTac model = make_model(kTimesteps, kLatent);
-  std::size_t stored_gradients = 0;
-  for (const auto& [name, info] : reference().tensors()) {
-    stored_gradients += name.starts_with("small.grad.") && !name.ends_with(".projection");
-  }
-  EXPECT_EQ(model.parameters().size(), stored_gradients);
+  EXPECT_EQ(std::ranges::count_if(reference().tensors(),
+                                  [](const auto& t) {
+                                    return t.first.starts_with("small.grad.") &&
+                                           !t.first.ends_with(".projection");
+                                  }),
+            std::ssize(model.parameters()))
+      << "PyTorch has others";
 }
 
 // Adam divides each gradient by its own size, so that rounding in a gradient near zero becomes a visible
@@ -188,7 +162,7 @@ TEST(Parity, TheModelHasExactlyTheNamedParameters) {
 // Both are compared: the parameters to 1e-5 in double precision and 5e-5 in fp32, their change - which an
 // error of the formula cannot hide in - to 1e-5 and 3e-4.
 TEST(Parity, TenStepsOfAdam) {
-  Comparison compare(kDouble ? 1e-5 : 5e-5), compare_change(kDouble ? 1e-5 : 3e-4);
+  constexpr double kOfValue = kDouble ? 1e-5 : 5e-5, kOfChange = kDouble ? 1e-5 : 3e-4;
   const SuperTac model = make_model(kTimesteps, kLatent);
   std::vector<std::vector<double>> before;
   for (const Parameter& p : model.parameters()) before.push_back(in_file_order(p, p.value.value()));
@@ -201,37 +175,34 @@ TEST(Parity, TenStepsOfAdam) {
     backward(loss.total);
     norms.push_back(adam.step());
   }
-  compare.expect("small.adam.losses", losses);
-  compare.expect("small.adam.norms", norms);
+  expect_stored("small.adam.losses", losses, kOfValue);
+  expect_stored("small.adam.norms", norms, kOfValue);
   for (std::size_t k = 0; k < before.size(); ++k) {
     const Parameter& p = model.parameters()[k];
     const std::vector<double> after = in_file_order(p, p.value.value());
     std::vector<double> change = after, expected = sampled(before[k]);
     for (std::size_t i = 0; i < change.size(); ++i) change[i] -= before[k][i];
-    compare_change.expect_sampled("small.change." + p.name, change);
+    expect_sampled("small.change." + p.name, change, kOfChange);
     const std::vector<double> moved = stored(reference(), "small.change." + p.name);
     for (std::size_t i = 0; i < moved.size(); ++i) expected[i] += moved[i];
-    compare.expect("small.parameter." + p.name, sampled(after), expected);
+    expect_near("small.parameter." + p.name, sampled(after), expected, kOfValue);
   }
 }
 
 TEST(Parity, SingleFrames) {
-  Comparison compare;
   const Tensor windows = small_windows();
   Tensor frames(Shape{kBatch, 1, kTaxels});
   for (Dim n = 0; n < kBatch; ++n)
     std::copy_n(windows.data() + ((n + 1) * kTimesteps - 1) * kTaxels, kTaxels, frames.data() + n * kTaxels);
-  compare.expect("small.frame.sr", doubles(make_model(1, kLatent).infer(frames)));
+  expect_stored("small.frame.sr", doubles(make_model(1, kLatent).infer(frames)));
 }
 
 TEST(Parity, VerticalGrouping) {
-  Comparison compare;
-  compare.expect("small.vertical.sr",
-                 doubles(make_model(kTimesteps, kLatent, Grouping::vertical).infer(small_windows())));
+  expect_stored("small.vertical.sr",
+                doubles(make_model(kTimesteps, kLatent, Grouping::vertical).infer(small_windows())));
 }
 
 TEST(Parity, FullSizeOutputs) {
-  Comparison compare;
   constexpr Dim kImages = 2, kT = 256, kLd = 10;
   std::vector<double> windows = counter_numbers("full.windows", kImages * kT * kTaxels);
   for (double& x : windows) x = (x + 1) / 2;
@@ -239,8 +210,8 @@ TEST(Parity, FullSizeOutputs) {
   const Tensor input = tensor({kImages, kT, kTaxels}, windows);
   std::array<Tensor, kGroups> eps;
   for (Tensor& t : eps) t = Tensor::zeros({kImages, kLd});
-  expect_outputs(compare, "full", model.forward(input, eps));
-  compare.expect("full.sr", doubles(model.infer(input)));
+  expect_outputs("full", model.forward(input, eps));
+  expect_stored("full.sr", doubles(model.infer(input)));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "models/networks/classifier.h"
 #include "tests/expect_error.h"
 #include "tests/models/support.h"
 
@@ -46,14 +47,9 @@ TEST(SuperTac, SingleFramesOfAnyArrayAtEveryScale) {
                                            .channels = 8,
                                            .rcabs = 1});
     EXPECT_EQ(model.infer(uniform({2, 1, 30}, 1)).shape(), (Shape{2, 2 * scale, 5 * scale, 1}));
-    EXPECT_EQ(what_of<std::invalid_argument>([&] {
-                model.infer(uniform({2, 2, 30}, 1));
-              }),
-              "SuperTac: windows expects [N,1,30], got [2,2,30]");
-    EXPECT_EQ(what_of<std::invalid_argument>([&] {
-                (void)model.encode(uniform({2, 1, 30}, 1));
-              }),
-              "SuperTac: a model of single frames has no latents; choose one of windows");
+    EXPECT_REFUSAL("SuperTac: windows expects [N,1,30], got [2,2,30]", model.infer(uniform({2, 2, 30}, 1)));
+    EXPECT_REFUSAL("SuperTac: a model of single frames has no latents; choose one of windows",
+                   (void)model.encode(uniform({2, 1, 30}, 1)));
     EXPECT_EQ(model.format().frames, 1);
     EXPECT_EQ(model.settings().latents(), 0);
     for (const Parameter& p : model.parameters()) EXPECT_TRUE(p.name.starts_with("upsampler.")) << p.name;
@@ -130,18 +126,39 @@ TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
     EXPECT_EQ(what_of<std::invalid_argument>([&, &s = settings] { random_network(s); }),
               "model settings: " + std::string(why));
   const SuperTac model = random_network();
-  EXPECT_EQ(what_of<std::invalid_argument>([&] {
-              model.infer(Tensor::zeros({1, 64, 16}));
-            }),
-            "SuperTac: windows expects [N,32,16], got [1,64,16]");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] {
-              model.forward(Tensor::zeros({1, 32, 16}), {});
-            }),
-            "SuperTac: eps expects 4 tensors, got 0");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { grouping_of("diagonal"); }),
-            "grouping must be horizontal or vertical, got \"diagonal\"");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { SuperTacSettings::of_preset("huge"); }),
-            "unknown preset \"huge\"; known: paper, tiny, frame");
+  EXPECT_REFUSAL("SuperTac: windows expects [N,32,16], got [1,64,16]",
+                 model.infer(Tensor::zeros({1, 64, 16})));
+  EXPECT_REFUSAL("SuperTac: eps expects 4 tensors, got 0", model.forward(Tensor::zeros({1, 32, 16}), {}));
+  EXPECT_REFUSAL("grouping must be horizontal or vertical, got \"diagonal\"", grouping_of("diagonal"));
+  EXPECT_REFUSAL("unknown preset \"huge\"; known: paper, tiny, frame", SuperTacSettings::of_preset("huge"));
+}
+
+TEST(TextureClassifier, TakesFramesAndPictures) {
+  Rng rng(1);
+  EXPECT_EQ(TextureClassifier({.height = 4, .width = 4, .classes = 6}, rng)
+                .forward(Variable(uniform({2, 4, 4, 1}, 1)))
+                .shape(),
+            (Shape{2, 6}));
+  EXPECT_EQ(TextureClassifier({.height = 16, .width = 16, .classes = 3}, rng)
+                .forward(Variable(uniform({2, 16, 16, 1}, 1)))
+                .shape(),
+            (Shape{2, 3}));
+  EXPECT_EQ(TextureClassifier({.height = 1, .width = 1, .channels = 40, .classes = 4}, rng)
+                .forward(Variable(uniform({3, 1, 1, 40}, 1)))
+                .shape(),
+            (Shape{3, 4}));
+}
+
+TEST(TextureClassifier, RefusesSettingsOutOfRange) {
+  Rng rng(1);
+  const std::pair<ClassifierSettings, const char*> refused[] = {
+      {{.height = 0, .width = 4, .classes = 6}, "0x4, 1 and 6"},
+      {{.height = 16, .width = 16, .classes = 1}, "16x16, 1 and 1"}};
+  for (const auto& [settings, got] : refused)
+    EXPECT_EQ(what_of<std::invalid_argument>([&, &s = settings] { TextureClassifier(s, rng); }),
+              std::string("TextureClassifier: expects sides of 1 to 2048, a channel or more and 2 to 1024 "
+                          "classes, got ") +
+                  got);
 }
 
 }  // namespace

@@ -4,15 +4,69 @@
 #include <omp.h>
 
 #include <atomic>
+#include <barrier>
+#include <thread>
 
 #include "tests/expect_error.h"
 #include "tests/models/support.h"
-#include "tests/models/thread_ranks.h"
 
 namespace supertac {
 namespace {
 
 using Texts = std::vector<std::string>;
+
+/// Where two ranks meet, and what each says there.
+struct Meeting {
+  std::barrier<> both{2};
+  std::span<const std::byte> said[2];
+};
+using Meetings = std::map<std::pair<int, int>, Meeting>;  // by the lower rank and the higher one
+
+/// Ranks that are threads of the test.
+class ThreadRanks : public Ranks {
+ public:
+  ThreadRanks(int rank, int size, Meetings& meetings) : Ranks(rank, size), meetings_(meetings) {}
+  ~ThreadRanks() override {  // nobody waits for one that has gone
+    for (auto& [who, meeting] : meetings_) {
+      if (who.first != rank() && who.second != rank()) continue;
+      meeting.said[who.second == rank()] = {};
+      meeting.both.arrive_and_drop();
+    }
+  }
+  void exchange(int partner, std::span<const std::byte> mine, std::span<std::byte> theirs) override {
+    Meeting& meeting = meetings_.at(std::minmax(rank(), partner));
+    meeting.said[rank() > partner] = mine;
+    meeting.both.arrive_and_wait();
+    const std::span<const std::byte> its = meeting.said[rank() < partner];
+    if (its.size() != theirs.size()) throw RanksError("another size than expected");
+    std::ranges::copy(its, theirs.begin());
+    meeting.both.arrive_and_wait();
+  }
+
+ private:
+  Meetings& meetings_;
+};
+
+/// Runs `work` on every rank at once; returns what each threw ("" = nothing).
+Texts on_ranks(int size, const std::function<void(Ranks&)>& work) {
+  Meetings meetings;
+  for (int high = 1; high < size; ++high)
+    for (int low = 0; low < high; ++low) meetings[{low, high}];
+  Texts errors(static_cast<std::size_t>(size));
+  std::vector<std::jthread> threads;
+  for (int rank = 0; rank < size; ++rank) {
+    threads.emplace_back([&, rank] {
+      ThreadRanks ranks(rank, size, meetings);
+      try {
+        work(ranks);
+      } catch (const std::exception& error) {
+        errors[static_cast<std::size_t>(rank)] = error.what();
+      }
+    });
+  }
+  threads.clear();
+  return errors;
+}
 
 TEST(Ranks, GatherTextsByRank) {
   on_ranks(4, [](Ranks& ranks) {

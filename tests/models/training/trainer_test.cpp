@@ -27,8 +27,8 @@ TEST(Trainer, Learns) {
   double last = 0;
   while (!trainer.done()) last = trainer.train_step().l2;
   EXPECT_LT(last, first / 4);
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { trainer.train_step(); }),
-            "train_step: all " + std::to_string(trainer.total_steps()) + " steps are done");
+  EXPECT_REFUSAL("train_step: all " + std::to_string(trainer.total_steps()) + " steps are done",
+                 trainer.train_step());
 }
 
 // Without noise the picture of the first step is that of inference.
@@ -267,19 +267,19 @@ TEST(Trainer, ReportsPicturesThatAreTheSameForAllAndIdleLatents) {
 TEST(Trainer, RefusesWindowsOfAnotherFormatOrNone) {
   SmallTraining small;
   const WindowSet& windows = small.windows;
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Trainer(windows, {}, Objective(windows, small.recipe)); }),
-            "batching: there is no window to train on");
+  EXPECT_REFUSAL("batching: there is no window to train on",
+                 Trainer(windows, {}, Objective(windows, small.recipe)));
   small.recipe.model.timesteps = 48;
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { small.trainer(); }),
-            "the data have 32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8, the model "
-            "expects 48 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8");
+  EXPECT_REFUSAL(
+      "the data have 32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8, the model "
+      "expects 48 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8",
+      small.trainer());
 }
 
 TEST(Trainer, RefusesWhatTheArrayCannotDo) {
   SmallTraining small;
   small.recipe.augment.dropped = 17;
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { small.trainer(); }),
-            "augmentation: dropped must be 0 to 16 taxels, got 17");
+  EXPECT_REFUSAL("augmentation: dropped must be 0 to 16 taxels, got 17", small.trainer());
 }
 
 }  // namespace

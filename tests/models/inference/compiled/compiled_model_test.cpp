@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "io/files/safetensors.h"
 #include "io/numbers/random.h"
 #include "models/inference/compiled/compiler.h"
+#include "tests/allocations.h"
 #include "tests/expect_error.h"
 #include "tests/models/support.h"
 
@@ -167,8 +169,8 @@ TEST(CompiledModel, InBytesDrawsNearlyTheSame) {
 
 TEST(CompiledModel, RefusesTheRangesOfAnotherNetwork) {
   const SuperTac network = random_network();
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { CompiledModel(network, ActivationRanges()); }),
-            "CompiledModel: the ranges are those of 0 ops, the network has 46");
+  EXPECT_REFUSAL("CompiledModel: the ranges are those of 0 ops, the network has 46",
+                 CompiledModel(network, ActivationRanges()));
 }
 
 TEST(CompiledModel, RefusesRangesThatAreNotFiniteOrNoPairs) {
@@ -193,11 +195,32 @@ TEST(CompiledModel, RefusesRangesThatAreNotFiniteOrNoPairs) {
 
 TEST(CompiledModel, RefusesInputsOfAnotherShape) {
   const SuperTac network = random_network();
-  EXPECT_EQ(what_of<std::invalid_argument>([&] {
-              CompiledModel(network).estimate(Tensor::zeros({1, 3, 16}));
-            }),
-            "CompiledModel: inputs expects [0,32,16] with any first size, got [1,3,16]");
+  EXPECT_REFUSAL("CompiledModel: inputs expects [0,32,16] with any first size, got [1,3,16]",
+                 CompiledModel(network).estimate(Tensor::zeros({1, 3, 16})));
   EXPECT_EQ(CompiledModel(network).estimate(Tensor::zeros(network.input_shape(0))).picture.dim(0), 0);
+}
+
+// A warm training step and a warm inference, compiled or not, go to the heap not once.
+long allocations_of_five(const std::function<void()>& warm) {
+  for (int i = 0; i < 3; ++i) warm();
+  const long before = allocations::made;
+  for (int i = 0; i < 5; ++i) warm();
+  return allocations::made - before;
+}
+
+TEST(NoAllocation, WarmTrainingStep) {
+  SmallTraining small;
+  small.recipe.augment = kStandardAugmentation;
+  Trainer trainer = small.trainer();
+  EXPECT_EQ(allocations_of_five([&] { trainer.train_step(); }), 0);
+}
+
+TEST(NoAllocation, WarmInference) {
+  const SuperTac network = random_network(SuperTacSettings::of_preset("paper"));
+  const CompiledModel compiled(network);
+  const Tensor one = uniform(network.input_shape(1), 1), many = uniform(network.input_shape(9), 1);
+  EXPECT_EQ(allocations_of_five([&] { network.infer(one); }), 0);
+  EXPECT_EQ(allocations_of_five([&] { compiled.estimate(one), compiled.estimate(many); }), 0);
 }
 
 }  // namespace

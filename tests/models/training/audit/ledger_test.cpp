@@ -1,12 +1,15 @@
-// The ledger's file and its comparison; whole trainings are compared in tests/apps/models/check_test.cpp.
+// The ledger's file and its comparison, and steps that are opened: they change nothing, end in the ledger's
+// line and show where every number came from. tests/apps/models/check_test.cpp compares whole trainings, and
+// judges steps.
 #include "models/training/audit/ledger.h"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
-#include "io/files/file.h"
-#include "tests/io/temporary_folder.h"
+#include "models/training/audit/opened_step.h"
+#include "tests/models/support.h"
 
 namespace supertac {
 namespace {
@@ -75,6 +78,48 @@ TEST(Ledger, NamesTheBatchesWhereAllTensorsAreTheSame) {
   EXPECT_EQ(found->step, 10);
   EXPECT_EQ(found->what, "the batches");
   EXPECT_TRUE(found->batches);
+}
+
+TEST(OpenedSteps, AreStepsLikeAnyOther) {
+  const SmallTraining small;
+  Trainer plain = small.trainer(), watched = small.trainer();
+  LedgerWriter of_plain(plain, 1), of_watched(watched, 1);
+  for (int step = 1; step <= 3; ++step) {
+    plain.train_step();
+    const OpenedStep opened = open_step(watched);
+    EXPECT_EQ(opened.step, step);
+    const LedgerLine line = *of_watched.after_step();
+    EXPECT_EQ(line.chain, of_plain.after_step()->chain);
+    // What the updates made is what the line says: its parameters first, then the two moments of each.
+    std::vector<std::string> parameters, moments;
+    for (const auto& ran : opened.operators) {
+      if (!ran["name"].get<std::string>().starts_with("update/")) continue;
+      parameters.push_back(ran["outputs"][0].get<std::string>().substr(0, 64));
+      for (const int k : {1, 2}) moments.push_back(ran["outputs"][k].get<std::string>().substr(0, 64));
+    }
+    parameters.insert(parameters.end(), moments.begin(), moments.end());
+    EXPECT_EQ(parameters, line.tensors);
+  }
+}
+
+TEST(OpenedSteps, EveryInputWasMadeBeforeOrIsAConstant) {
+  const SmallTraining small;
+  Trainer trainer = small.trainer();
+  const OpenedStep opened = open_step(trainer);
+  std::set<std::string> made;
+  std::size_t inputs = 0, constants = 0, unmade = 0;
+  for (const auto& ran : opened.operators) {
+    if (ran.contains("inputs"))
+      for (const std::string input : ran["inputs"]) ++inputs, constants += !made.contains(input);
+    if (ran.contains("gy")) {
+      EXPECT_TRUE(made.contains(ran["y"])) << ran;
+      unmade += !made.contains(ran["gy"]);
+    }
+    for (const std::string output : ran["outputs"]) made.insert(output);
+  }
+  EXPECT_GT(inputs, 1000U);
+  EXPECT_LT(constants, inputs / 20);
+  EXPECT_LE(unmade, 8U);  // dL/dL of each micro-batch, which is 1
 }
 
 }  // namespace
