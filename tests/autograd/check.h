@@ -1,8 +1,6 @@
 // What the tests of ops share: numbers to feed in, and one-line checks of values, gradients and messages.
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -13,7 +11,7 @@
 #include "autograd/ops/arithmetic.h"
 #include "autograd/tensor.h"
 #include "autograd/variable.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
 namespace supertac::test {
 

@@ -3,9 +3,9 @@
 #include "autograd/ops/arithmetic.h"
 #include "autograd/record.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::gradient_checker_test {
 
 /// Of a function of inputs; its leaves are copies.
 GradientReport checked(const std::function<Variable(const std::vector<Variable>&)>& f,
@@ -116,5 +116,4 @@ TEST(GradientChecker, OfEmptyInputsNothingIsCompared) {
   EXPECT_EQ(report.text(), "");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::gradient_checker_test

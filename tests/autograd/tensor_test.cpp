@@ -1,12 +1,11 @@
 #include "autograd/tensor.h"
 
 #include <thread>
-#include <utility>
 
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::tensor_test {
 
 TEST(Shape, TextAndElements) {
   EXPECT_EQ((Shape{4, 16, 16, 32}).text(), "[4,16,16,32]");
@@ -79,5 +78,4 @@ TEST(Tensor, RefusesWrongCounts) {
   EXPECT_EQ(Tensor::full({1, 1}, 7).item(), 7);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::tensor_test

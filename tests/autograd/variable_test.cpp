@@ -1,7 +1,5 @@
 #include "autograd/variable.h"
 
-#include <memory>
-#include <string>
 #include <thread>
 
 #include "autograd/ops/activations.h"
@@ -11,9 +9,9 @@
 #include "autograd/record.h"
 #include "autograd/trace.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::variable_test {
 
 using test::parameter;
 
@@ -205,5 +203,4 @@ TEST(Record, TakesAtMostEightInputs) {
                  record("nine", Tensor::zeros({1}), inputs, [](Backward&) {}));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::variable_test

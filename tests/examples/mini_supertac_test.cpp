@@ -1,5 +1,4 @@
 // examples/mini_supertac.cpp and the project, from one checkpoint, on the same windows.
-#include <gtest/gtest.h>
 
 #include <cstdio>
 #include <fstream>
@@ -12,11 +11,11 @@
 #pragma GCC diagnostic ignored "-Wreturn-type"  // main() alone may do without
 #define main mini_supertac_main
 #include "examples/mini_supertac.cpp"
+#include "tests/support/test.h"
 #undef main
 #pragma GCC diagnostic pop
 
-namespace supertac {
-namespace {
+namespace supertac::mini_supertac_test {
 
 constexpr double kTolerance = sizeof(real) == 4 ? 1e-5 : 1e-9;
 
@@ -104,5 +103,4 @@ TEST(MiniSuperTac, FitsOnAFewPages) {
   EXPECT_GT(lines, 0);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::mini_supertac_test

@@ -1,16 +1,12 @@
 // Failures 1, 2 and 4: the network stops to look at its input, and the loss falls all the same.
-#include <gtest/gtest.h>
 #include <omp.h>
-
-#include <cmath>
-#include <numeric>
 
 #include "autograd/ops/activations.h"
 #include "autograd/ops/losses.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::collapse_test {
 
 class CollapseTest : public ::testing::Test {
  protected:
@@ -133,5 +129,4 @@ TEST_F(CollapseTest, F2PosteriorCollapsesAboveTheThresholdOfBetaAndIsReported) {
   EXPECT_GT(below.decoded, 20 * above.decoded);  // swapping z changes what is decoded, or does not
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::collapse_test

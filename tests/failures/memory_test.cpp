@@ -1,15 +1,14 @@
 // Out of memory: the N-th `new` fails, for every N, while a model is loaded, trained for a step, and run.
 // Each failure must arrive as std::bad_alloc, leave nothing behind, and a second try must succeed.
-#include <gtest/gtest.h>
 #include <omp.h>
 
 #include <new>
 
 #include "tests/allocations.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::memory_test {
 
 // Runs `work` with its first, second, ... allocation failing until it comes through; returns how many failed.
 template <class F>
@@ -76,5 +75,4 @@ TEST_F(MemoryTest, InferenceOfNewWindows) {
   expect_survival([&] { model.infer(uniform({16, 128, 16}, 1)); });
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::memory_test

@@ -1,14 +1,11 @@
 // Failures 8, 9 and 10: what the layers do to a picture before anything is learnt.
-#include <gtest/gtest.h>
-
-#include <cmath>
 
 #include "autograd/ops/arithmetic.h"
 #include "layers/residual.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::network_test {
 
 // A constant map, doubled by random weights: the variance of the means of the four pixel phases, relative to
 // the square of the mean.
@@ -107,5 +104,4 @@ TEST(Failures, F10GatesBeginFarFromSaturation) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::network_test

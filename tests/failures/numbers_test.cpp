@@ -1,15 +1,12 @@
 // Failures 3, 5, 6, 11 and 13: numbers that overflow, do not act, or should not have come.
-#include <gtest/gtest.h>
-
-#include <cmath>
 
 #include "autograd/ops/activations.h"
 #include "autograd/ops/losses.h"
 #include "autograd/ops/vae.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::failures_numbers_test {
 
 bool finite(const Tensor& t) {
   return std::all_of(t.values().begin(), t.values().end(), [](real x) { return std::isfinite(x); });
@@ -165,5 +162,4 @@ TEST(Failures, F3ARateAHundredTimesTooHighNeverTrainsOnNan) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::failures_numbers_test

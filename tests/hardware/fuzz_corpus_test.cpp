@@ -3,9 +3,9 @@
 #include "tests/fuzz/frame_decoder_properties.h"
 #include "tests/fuzz/journal_properties.h"
 #include "tests/fuzz/marlin_reply_properties.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::fuzz_corpus_test {
 
 TEST(FuzzCorpus, FrameDecoder) { EXPECT_GE(replay("frame_decoder", check_frame_decoder), 62); }
 
@@ -13,5 +13,4 @@ TEST(FuzzCorpus, MarlinReplies) { EXPECT_GE(replay("marlin_reply", check_marlin_
 
 TEST(FuzzCorpus, Journals) { EXPECT_GE(replay("journal", check_journal), 26); }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::fuzz_corpus_test

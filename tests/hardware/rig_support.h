@@ -15,7 +15,7 @@
 #include "hardware/printers/printer.h"
 #include "io/numbers/random.h"
 #include "tests/hardware/simulated_rig.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace supertac {
 

@@ -1,17 +1,9 @@
 #include "layers/checkpoint.h"
 
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <limits>
-#include <numeric>
-
 #include "layers/convolution.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::checkpoint_test {
 
 class CheckpointTest : public testing::Test {
  protected:
@@ -85,5 +77,4 @@ TEST_F(CheckpointTest, RefusesOtherFilesAndNewerVersions) {
   EXPECT_NE(message().find("checkpoint version"), std::string::npos) << message();
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::checkpoint_test

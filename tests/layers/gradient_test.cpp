@@ -1,17 +1,13 @@
 // The inputs of every op one by one, and errors planted in each; `supertac-check gradients` compares all of
 // apps/check/gradient_cases.cpp with finite differences.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <utility>
 
 #include "apps/check/gradient_cases.h"
 #include "autograd/gradient_checker.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/trace.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::gradient_test {
 
 TEST(OpGradients, AnInputHasTheSameOneWhereAllOthersAreConstants) {
   for (const GradientCase& c : op_cases()) {
@@ -65,5 +61,4 @@ TEST(OpGradients, APlantedErrorIsFoundAndNamed) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::gradient_test

@@ -1,15 +1,10 @@
 #include "layers/module.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "layers/convolution.h"
 #include "layers/residual.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::module_test {
 
 // U(-1/sqrt(fan_in), 1/sqrt(fan_in)) has the standard deviation 1/sqrt(3 fan_in).
 TEST(Module, InitialisationHasTheVarianceItStates) {
@@ -35,5 +30,4 @@ TEST(Module, RefusesALayerWithoutInputsOrChannels) {
   EXPECT_NO_THROW(ChannelAttention(4, 4, rng));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::module_test

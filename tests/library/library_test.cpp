@@ -1,12 +1,6 @@
-#include <gtest/gtest.h>
 #include <supertac/supertac.h>
 
-#include <bit>
-#include <cmath>
-#include <cstdlib>
-#include <string>
 #include <thread>
-#include <vector>
 
 #include "data/map/surface_map.h"
 #include "data/recordings/recording.h"
@@ -19,12 +13,10 @@
 #include "models/inference/compiled/compiled_model.h"
 #include "models/training/train.h"
 #include "tests/data/test_recordings.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::library_test {
 
 class Library : public testing::Test {
  protected:
@@ -371,5 +363,4 @@ TEST_F(Library, TakesAnyBytesAndAnyCalls) {
   EXPECT_GT(opened, runs / 20);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::library_test

@@ -9,7 +9,7 @@
 #include "data/windows/windows.h"
 #include "io/files/file.h"
 #include "models/training/train.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace supertac {
 

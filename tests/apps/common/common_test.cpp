@@ -1,10 +1,8 @@
-#include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <csignal>
-#include <filesystem>
 #include <thread>
 
 #include "apps/common/command_line/arguments.h"
@@ -14,11 +12,9 @@
 #include "apps/common/running/signals.h"
 #include "apps/common/running/threads.h"
 #include "io/files/file.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::common_test {
 
 namespace fs = std::filesystem;
 
@@ -254,5 +250,4 @@ TEST(Signals, WhatMustBeFinishedIs) {
   EXPECT_EXIT((finish_and_go_on(), _exit(0)), testing::KilledBySignal(SIGINT), "");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::common_test

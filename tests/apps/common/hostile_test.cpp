@@ -6,9 +6,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
 #include <fstream>
 
 #include "apps/common/command_line/arguments.h"
@@ -17,9 +14,9 @@
 #include "io/files/folder_lock.h"
 #include "tests/apps/common/expect.h"
 #include "tests/sanitized.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::hostile_test {
 
 namespace fs = std::filesystem;
 
@@ -255,5 +252,4 @@ TEST_F(Outputs, InAFolderOfAPlatesNameReplaceNoInput) {
       0);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::hostile_test

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace supertac {
 

@@ -9,9 +9,9 @@
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "tests/apps/common/expect.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::programs_test {
 
 constexpr std::uint64_t kPlenty = 1 << 26;
 
@@ -209,5 +209,4 @@ TEST_F(Dispatcher, EveryProgramOfTheListIsThereAndSaysWhatItIsFor) {
   EXPECT_GE(programs, 10u);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::programs_test

@@ -1,19 +1,12 @@
 #include "apps/import/text_folder.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 
 #include "data/windows/windows.h"
 #include "tests/data/registration/lossy_pass.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::text_folder_test {
 
 std::vector<ImportedPass> import_all(const std::string& root, const FolderImport& settings) {
   std::vector<ImportedPass> all;
@@ -185,5 +178,4 @@ TEST(TextFolder, TheSummaryTellsWhatBecameOfAPass) {
   EXPECT_EQ(pass.to_json()["too_few_columns"], 2);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::text_folder_test

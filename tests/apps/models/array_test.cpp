@@ -1,10 +1,7 @@
 // Another sensor from simulation to scores: nothing but the recordings says what it is.
-#include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <csignal>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "data/recordings/recording.h"
@@ -15,9 +12,9 @@
 #include "io/numbers/sha256.h"
 #include "models/files/model_file.h"
 #include "tests/apps/common/expect.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::array_test {
 
 class Array : public ProgramTest {
  protected:
@@ -309,5 +306,4 @@ TEST_F(Array, CompanionsBelongToTheirOwnTable) {
   EXPECT_EQ(run("supertac-import log --sensor mat.json --truth-range 5,5 --out none").code, 2);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::array_test

@@ -1,17 +1,15 @@
 // supertac-info --chain and supertac-check chain: one bit that is changed anywhere is found, and its link
 // named.
-#include <gtest/gtest.h>
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <random>
 
 #include "io/files/safetensors.h"
 
 #include "tests/apps/common/trained.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::chain_test {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
@@ -153,5 +151,4 @@ TEST_F(Chain, EveryOneOfAHundredPlantedBitsIsFoundAndItsLinkNamed) {
     }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::chain_test

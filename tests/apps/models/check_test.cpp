@@ -1,11 +1,8 @@
 // supertac-check: what it finds, and that it finds what is wrong.
-#include <gtest/gtest.h>
 
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
-#include <set>
 
 #include "data/plates/plate_mesh.h"
 #include "data/recordings/recording.h"
@@ -13,9 +10,9 @@
 #include "io/files/safetensors.h"
 #include "io/numbers/sha256.h"
 #include "tests/apps/common/trained.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::check_test {
 
 // The ops whose results are recorded, by the sources themselves: record("name", ...), or another function
 // that is given the name and does not refuse arguments. What takes inputs apart has no gradient.
@@ -237,5 +234,4 @@ TEST_F(Audit, ARefereeComputesAStepAgain) {
   EXPECT_EQ(python("verify_ledger.py judged.run", "verified.txt"), 0) << bytes("verified.txt");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::check_test

@@ -1,9 +1,9 @@
 // supertac-classify as a process: results, same bits, and what it refuses.
 #include "io/files/json.h"
 #include "tests/apps/common/simulated_data.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::classify_test {
 
 class Classify : public OnSimulatedData {
  protected:
@@ -61,5 +61,4 @@ TEST_F(Classify, RefusesModelsThatMayHaveSeenTheTest) {
     expect_exit(run("supertac-classify --data data --epochs 1 --seeds 1 --model " + options), code, message);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::classify_test

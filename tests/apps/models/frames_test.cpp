@@ -1,16 +1,14 @@
 // Single frames with measured truths, from a file of pairs: imported, trained on, scored, streamed, told
 // apart.
-#include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "data/recordings/recording.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/random.h"
 #include "tests/apps/common/expect.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::frames_test {
 
 /// A ridge at a random place and angle under an array of 4 x 6 taxels; five groups of twelve.
 class Frames : public ProgramTest {
@@ -144,5 +142,4 @@ TEST_F(Frames, PicturesBelowSevenPixelsAreJudgedByASmallerWindowAndItIsSaid) {
   EXPECT_TRUE(json("s.json")["all"]["ssim"].is_number());
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::frames_test

@@ -5,16 +5,15 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <filesystem>
 #include <fstream>
-#include <functional>
 #include <sstream>
 #include <thread>
 
 #include "tests/apps/common/trained.h"
 
-namespace supertac {
-namespace {
+#include "tests/support/test.h"
+
+namespace supertac::models_ranks_test {
 
 namespace fs = std::filesystem;
 
@@ -142,5 +141,4 @@ TEST_F(Mpi, ADiskThatIsFullOnTheFirstRankIsOneLine) {
   expect_one_line(result, "last.safetensors");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::models_ranks_test

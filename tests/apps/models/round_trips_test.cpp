@@ -1,9 +1,4 @@
 // Every kind of file that a program writes: read and written again, it has the same bytes.
-#include <algorithm>
-#include <filesystem>
-#include <functional>
-#include <map>
-#include <set>
 
 #include "data/plates/stl.h"
 #include "data/recordings/recording.h"
@@ -12,9 +7,9 @@
 #include "io/files/json.h"
 #include "io/files/provenance.h"
 #include "tests/apps/common/trained.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::round_trips_test {
 
 namespace fs = std::filesystem;
 
@@ -176,5 +171,4 @@ TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
   EXPECT_EQ(kept(), before);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::round_trips_test

@@ -1,9 +1,9 @@
 // supertac-evaluate and supertac-stream with several models: averaged or refused.
 #include "io/files/json.h"
 #include "tests/apps/common/trained.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::several_models_test {
 
 using SeveralModels = Training;
 
@@ -42,5 +42,4 @@ TEST_F(SeveralModels, NetworksThatLeftOutTheSamePlateAreAveraged) {
               "by left-out plate 6_Bumps, of another by left-out plate 6_Ridges");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::several_models_test

@@ -1,15 +1,13 @@
 // supertac-sweep as a process: a small grid, going on after an end, damaged tables.
-#include <gtest/gtest.h>
 
 #include <csignal>
-#include <filesystem>
 #include <sstream>
 
 #include "io/files/provenance.h"
 #include "tests/apps/common/simulated_data.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::sweep_test {
 
 namespace fs = std::filesystem;
 
@@ -123,5 +121,4 @@ TEST_F(Sweep, BadInputIsOneLine) {
   EXPECT_FALSE(fs::exists(path("bad2/sweep.csv")));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::sweep_test

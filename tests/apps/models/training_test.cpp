@@ -1,9 +1,4 @@
 // supertac-train and supertac-evaluate as processes: same bits, exact resume, bad input.
-#include <gtest/gtest.h>
-#include <cstdlib>
-#include <filesystem>
-#include <functional>
-#include <numeric>
 #include <regex>
 
 #include "data/recordings/recording.h"
@@ -12,9 +7,9 @@
 #include "io/files/provenance.h"
 #include "io/files/safetensors.h"
 #include "tests/apps/common/trained.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::training_test {
 
 namespace fs = std::filesystem;
 
@@ -281,5 +276,4 @@ TEST_F(Training, TheBarShowsEpochLossAndTestSsim) {
       << made.error;
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::training_test

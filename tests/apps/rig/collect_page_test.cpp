@@ -2,9 +2,9 @@
 #include "tests/apps/common/expect.h"
 #include "tests/apps/rig/collect_run.h"
 #include "tests/apps/web/http_client.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::collect_page_test {
 
 TEST(CollectPage, ShowsTheRunAndItsButtonEndsItAsCtrlCDoes) {
   CollectRun run;
@@ -36,5 +36,4 @@ TEST(CollectPage, ShowsTheRunAndItsButtonEndsItAsCtrlCDoes) {
   EXPECT_GT(run.head().z, kLiftedZ - 0.1);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::collect_page_test

@@ -15,9 +15,9 @@
 #include "tests/apps/rig/collect_run.h"
 #include "tests/apps/web/http_client.h"
 #include "tests/hardware/fake_sensor.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::collect_sensor_test {
 
 constexpr const char* kBed = R"({"plate": [300, 310, 91.81], "origin": [310, 315, 121.81],
   "low": [200, 200, 0], "high": [400, 420, 200], "first_x_mm": 15, "shift_mm": 3, "passes": 2,
@@ -262,5 +262,4 @@ TEST_F(CollectSensor, WhatCannotBeIsRefusedBeforeAnythingMoves) {
   EXPECT_EQ(run_.head(), before);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::collect_sensor_test

@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <cstdlib>
 #include <fstream>
 
 #include "hardware/collection/collection.h"
@@ -13,9 +12,9 @@
 #include "tests/apps/rig/collect_run.h"
 #include "tests/hardware/fake_sensor.h"
 #include "tests/hardware/numbered_board.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::collect_test {
 
 TEST(CollectProgram, MakesRecordingsAndLeavesTheHeadAtItsOrigin) {
   CollectRun run;
@@ -249,5 +248,4 @@ TEST(CollectProgram, APortThatCannotBeUsedIsOneClearLine) {
   EXPECT_EQ(run.collect({"--speed", "50"}).code, 0) << "the next start, with the right ports, is not held up";
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::collect_test

@@ -1,4 +1,3 @@
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "data/plates/plate.h"
@@ -6,9 +5,9 @@
 #include "data/windows/windows.h"
 #include "io/files/file.h"
 #include "tests/apps/common/expect.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::rig_plate_test {
 
 using PlateProgram = ProgramTest;
 
@@ -52,5 +51,4 @@ TEST_F(PlateProgram, APrintedPlateIsSimulatedAndImportedLikeANamedOne) {
   EXPECT_TRUE(std::filesystem::exists(path("imported/my.stl")));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::rig_plate_test

@@ -2,15 +2,14 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "data/windows/windows.h"
 #include "io/files/file.h"
 #include "tests/apps/common/expect.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::rig_rig_test {
 
 /// A virtual rig with a printed plate, four times faster than a real one.
 class RigTest : public ProgramTest {
@@ -72,5 +71,4 @@ TEST_F(ImportJournal, RefusesWhatIsNoJournalAndMixedOptions) {
   EXPECT_EQ(run("supertac-import --out " + out).code, 2);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::rig_rig_test

@@ -1,14 +1,12 @@
 // What a picture costs a live stream beside arithmetic: no block of the heap, no lock, no thread that runs or
 // spins.
 #include <dlfcn.h>
-#include <gtest/gtest.h>
 #include <pthread.h>
-
-#include <filesystem>
 
 #include "apps/stream/picture_maker.h"
 #include "data/sensors/rig.h"
 #include "tests/allocations.h"
+#include "tests/support/test.h"
 
 namespace {
 std::atomic<long> locks{0};

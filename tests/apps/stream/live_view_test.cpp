@@ -1,13 +1,11 @@
 // What a stream shows of itself on a terminal, and how late it is.
-#include <gtest/gtest.h>
 
 #include "apps/stream/latency_histogram.h"
 #include "apps/stream/live_state.h"
 #include "apps/stream/raw_array.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::live_view_test {
 
 TEST(LatencyHistogram, QuantilesAreRightToAClass) {
   LatencyHistogram histogram;
@@ -56,5 +54,4 @@ TEST(StatusLine, SaysWhereTheFingerIsAndThatSignalsAreStrange) {
   EXPECT_TRUE(status_line(state).starts_with("UNLIKE TRAINING  0 f"));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::live_view_test

@@ -1,17 +1,13 @@
 // An order from presses that are not clean: wired at random, felt by neighbours too, noisy, slow to let go.
 #include "apps/stream/pressed_order.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
 
 #include "io/numbers/random.h"
 #include "tests/apps/common/expect.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::pressed_order_test {
 
 TEST(PressedOrder, IsTheWiringWhateverIsFeltBesides) {
   const TemporaryFolder folder;
@@ -86,5 +82,4 @@ TEST(PressedOrder, WritesNothingOverAFileThatHasChanged) {
   EXPECT_EQ(read_sensor(folder / "sensor.json").name, "edited meanwhile");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::pressed_order_test

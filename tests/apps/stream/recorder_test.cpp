@@ -1,14 +1,9 @@
 // Recordings at somebody's wish.
 #include "apps/stream/recorder.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <filesystem>
-
-#include "tests/io/temporary_folder.h"
-
-namespace supertac {
-namespace {
+namespace supertac::recorder_test {
 
 namespace fs = std::filesystem;
 
@@ -98,5 +93,4 @@ TEST_F(RecorderTest, AFolderThatIsGoneIsSaid) {
   EXPECT_EQ(recorder.status().recording, "");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::recorder_test

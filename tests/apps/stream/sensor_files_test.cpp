@@ -10,9 +10,7 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <thread>
 
 #include "data/recordings/recording.h"
@@ -24,9 +22,9 @@
 #include "io/numbers/text.h"
 #include "tests/apps/common/expect.h"
 #include "tests/hardware/fake_sensor.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::sensor_files_test {
 
 /// Sends a sensor's frames in real time, over the kind of port that its file names, until it is destroyed.
 class FakeDevice {
@@ -363,5 +361,4 @@ TEST_F(SensorFiles, FromSimulatedPassesToLivePictures) {
   EXPECT_LT(worst, 1e-5F);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::sensor_files_test

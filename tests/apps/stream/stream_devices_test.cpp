@@ -2,7 +2,6 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <filesystem>
 
 #include "apps/stream/picture_log.h"
 #include "data/recordings/recording.h"
@@ -10,9 +9,9 @@
 #include "tests/apps/stream/streaming.h"
 #include "tests/hardware/fake_sensor.h"
 #include "tests/hardware/numbered_board.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::stream_devices_test {
 
 namespace fs = std::filesystem;
 
@@ -113,5 +112,4 @@ TEST_F(Streaming, ASignalEndsItCleanly) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::stream_devices_test

@@ -5,18 +5,16 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cmath>
 #include <csignal>
-#include <filesystem>
 
 #include "apps/stream/stream.h"
 #include "data/recordings/recording.h"
 #include "data/simulation/simulator.h"
 #include "data/windows/windows.h"
 #include "hardware/ports/serial_port.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::stream_test {
 
 namespace fs = std::filesystem;
 
@@ -287,5 +285,4 @@ TEST_F(Streaming, ATerminalThatIsNotReadHoldsUpNobody) {
   EXPECT_GT(kept("out").f64("time_s").size(), 0U);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::stream_test

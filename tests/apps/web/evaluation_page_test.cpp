@@ -3,9 +3,9 @@
 #include "io/files/json.h"
 #include "models/files/model_file.h"
 #include "tests/apps/common/simulated_data.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::evaluation_page_test {
 
 using EvaluationPage = OnSimulatedData;
 
@@ -41,5 +41,4 @@ TEST_F(EvaluationPage, HoldsScoresWindowsAndWhatMadeIt) {
   EXPECT_EQ(run(line).code, 1);  // nothing is overwritten
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::evaluation_page_test

@@ -1,15 +1,10 @@
 #include "apps/web/result_page.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "apps/web/web_options.h"
 #include "tests/apps/common/expect.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::result_page_test {
 
 TEST(ResultPage, IsWholeAndItsDataAreNoMarkup) {
   const std::string page = result_page({{"title", "a </script> <title>"}, {"value", NAN}});
@@ -40,5 +35,4 @@ TEST(WebOption, NamesAPortAndWhoMaySee) {
                   std::string(wrong) + "'");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::result_page_test

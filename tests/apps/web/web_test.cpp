@@ -1,13 +1,10 @@
 // The server of the live page: who may come in, what leaves, and what a slow reader costs.
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include <atomic>
 #include <chrono>
-#include <cstdlib>
 #include <fstream>
 #include <random>
-#include <span>
 
 #include "apps/stream/views/web_view.h"
 #include "apps/web/encode.h"
@@ -19,9 +16,9 @@
 #include "tests/apps/common/expect.h"
 #include "tests/apps/web/http_client.h"
 #include "tests/fuzz/corpus.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::web_test {
 
 TEST(Encode, Base64IsThatOfRfc4648) {
   const auto encoded = [](std::string_view text) {
@@ -355,5 +352,4 @@ TEST(WebView, AnEventHoldsThePictureAndWhatIsKnownOfIt) {
   EXPECT_EQ(told["rows"][0]["open"], 1);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::web_test

@@ -5,6 +5,7 @@
 #include "autograd/kernels/fast/conv.h"
 #include "autograd/kernels/fast/isa/isa.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
 namespace supertac::kernels {
 namespace {

@@ -1,8 +1,6 @@
 #include "autograd/kernels/exp.h"
 
-#include <gtest/gtest.h>
-
-#include <limits>
+#include "tests/support/test.h"
 
 namespace supertac::kernels {
 namespace {

@@ -1,17 +1,14 @@
 // The bits of convolutions and of Muon, as they are on every processor; those of the other ops stand in
 // Trainer.PinnedBits. Whoever changes the arithmetic on purpose changes these numbers with it, and says so.
-#include <gtest/gtest.h>
-
-#include <bit>
 
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/losses.h"
 #include "autograd/optimisers/adam.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::pinned_bits_test {
 
 using test::numbers;
 using test::parameter;
@@ -65,5 +62,4 @@ TEST(PinnedBits, Muon) {
   EXPECT_EQ(bits_of({tall.value(), wide.value()}), 0xfaffca44ea026b4dU);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::pinned_bits_test

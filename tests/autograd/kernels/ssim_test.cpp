@@ -1,12 +1,11 @@
 // SSIM's traps: flat images, opposite images, values far from zero, small images.
-#include <algorithm>
 
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/losses.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::ssim_test {
 
 using namespace test;
 
@@ -105,5 +104,4 @@ TEST(Ssim, RefusesOtherShapes) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::ssim_test

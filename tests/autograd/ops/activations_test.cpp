@@ -4,9 +4,9 @@
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/linear.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::activations_test {
 
 using namespace test;
 
@@ -117,5 +117,4 @@ TEST(FusedActivation, RefusesANegativeSlope) {
                  conv1d(line, taps, b, {.padding = 1, .negative_slope = real(-0.5)}));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::activations_test

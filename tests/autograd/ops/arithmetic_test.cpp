@@ -1,9 +1,9 @@
 #include "autograd/ops/arithmetic.h"
 
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::arithmetic_test {
 
 using namespace test;
 
@@ -44,5 +44,4 @@ TEST(Arithmetic, RefusesOtherShapes) {
   EXPECT_REFUSAL("subtract: x expects a value, got an empty Variable", 1 - Variable());
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::arithmetic_test

@@ -1,13 +1,11 @@
 #include "autograd/ops/attention.h"
 
-#include <array>
-
 #include "autograd/kernels/attention.h"
 #include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::attention_test {
 
 using namespace test;
 
@@ -59,5 +57,4 @@ TEST(Attention, RefusesOtherShapes) {
   EXPECT_REFUSAL("gated_sum: s expects [2,3], got [3,2]", gated_sum(x, x, zeros({3, 2})));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::attention_test

@@ -2,9 +2,9 @@
 
 #include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::convolution_test {
 
 using namespace test;
 
@@ -75,5 +75,4 @@ TEST(Conv, RefusesEmptyOutputs) {
       conv_transpose2d(x, w, b, {.padding = 2}));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::convolution_test

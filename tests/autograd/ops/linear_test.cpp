@@ -2,9 +2,9 @@
 
 #include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::linear_test {
 
 using namespace test;
 
@@ -35,5 +35,4 @@ TEST(Linear, RefusesOtherShapes) {
   EXPECT_REFUSAL("linear: b expects [5], got [3]", linear(x, w, zeros({3})));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::linear_test

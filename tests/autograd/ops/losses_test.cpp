@@ -1,11 +1,9 @@
 #include "autograd/ops/losses.h"
 
-#include <vector>
-
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::losses_test {
 
 using namespace test;
 
@@ -57,5 +55,4 @@ TEST(CrossEntropy, RefusesWrongLabels) {
                  cross_entropy(zeros({0, 3}), {}));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::losses_test

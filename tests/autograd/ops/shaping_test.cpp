@@ -1,13 +1,10 @@
 #include "autograd/ops/shaping.h"
 
-#include <cmath>
-#include <limits>
-
 #include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::shaping_test {
 
 using namespace test;
 
@@ -121,5 +118,4 @@ TEST(MaxPool, RefusesOtherShapes) {
   EXPECT_REFUSAL("max_pool2d: x expects H, W >= 2, got [1,1,4,3]", max_pool2d(zeros({1, 1, 4, 3})));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::shaping_test

@@ -3,9 +3,9 @@
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::vae_test {
 
 using namespace test;
 
@@ -53,5 +53,4 @@ TEST(Vae, RefusesOtherShapes) {
   EXPECT_REFUSAL("kl_divergence: log_var expects the shape of mean, [2,3], got [3,2]", kl_divergence(a, b));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::vae_test

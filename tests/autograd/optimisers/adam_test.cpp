@@ -1,11 +1,9 @@
 #include "autograd/optimisers/adam.h"
 
-#include <limits>
-
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::adam_test {
 
 using namespace test;
 
@@ -169,5 +167,4 @@ TEST(Muon, TakesForMatricesWhatHasEightRowsAndColumns) {
     EXPECT_FALSE(is_matrix(shape)) << shape.text();
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::adam_test

@@ -1,12 +1,9 @@
 #include "autograd/optimisers/adam.h"
 
-#include <numeric>
-#include <vector>
-
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::orthogonal_test {
 
 using namespace test;
 using Matrix = std::vector<double>;
@@ -61,5 +58,4 @@ TEST(Orthogonal, SizeMattersNotAndNothingStaysNothing) {
   for (const real v : faint.values()) ASSERT_LT(std::abs(v), 0.01);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::orthogonal_test

@@ -1,15 +1,12 @@
 #include "data/clock/frame_clock.h"
 
-#include <gtest/gtest.h>
-
 #include <cstdio>
-#include <cstdlib>
 
 #include "io/numbers/median.h"
 #include "tests/data/clock/simulated_stream.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::frame_clock_test {
 
 std::string describe(const StreamTraits& t) {
   char text[400];
@@ -263,5 +260,4 @@ TEST(FrameClock, AClockInSecondsMayHaveDecimals) {
 TEST(FrameClock, EveryLiveDateIsWithinItsBound) { study(live_score); }
 TEST(FrameClock, EveryDateOfARecordingIsWithinItsBound) { study(whole_score); }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::frame_clock_test

@@ -1,11 +1,9 @@
 #include "data/frames/frame_decoder.h"
 
-#include <gtest/gtest.h>
-
 #include "tests/hardware/rig_support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::frame_decoder_test {
 
 std::vector<BoardFrame> decode_board(FrameDecoder& decoder, std::span<const std::byte> bytes,
                                      std::size_t piece) {
@@ -137,5 +135,4 @@ TEST(FrameDecoder, AcceptsHardlyAnyWrongFrameUnderMixedFaults) {
   EXPECT_GE(got.size(), stream.intact.size());
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::frame_decoder_test

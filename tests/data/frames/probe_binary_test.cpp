@@ -1,18 +1,15 @@
 // Binary layouts that nobody has tried, from a seeded generator: what the probe drafts is right, or it drafts
 // nothing and says why.
-#include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "data/frames/probe.h"
 #include "data/frames/sensor_decoder.h"
 #include "io/numbers/random.h"
 #include "tests/hardware/fake_sensor.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::probe_binary_test {
 
 struct Dice {
   RandomStream random;
@@ -326,5 +323,4 @@ TEST(ProbeBinary, PrintableValuesAreNoText) {
   EXPECT_NE(layout.says.find("header AA55, 384 values u8"), std::string::npos) << layout.says;
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::probe_binary_test

@@ -1,17 +1,12 @@
 #include "data/frames/probe.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
 #include "tests/hardware/fake_sensor.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::probe_test {
 
 Sensor sensor_of(const std::string& json) { return sensor_of_json(json, "test"); }
 
@@ -395,5 +390,4 @@ TEST(Probe, OfAnythingEndsAndHasADraftThatReads) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::probe_test

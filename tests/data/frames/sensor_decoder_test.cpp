@@ -1,15 +1,12 @@
 #include "data/frames/sensor_decoder.h"
 
-#include <gtest/gtest.h>
-
-#include <map>
 #include <random>
 
 #include "data/frames/binary_decoder.h"
 #include "tests/hardware/fake_sensor.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::sensor_decoder_test {
 
 Sensor sensor_with(const std::string& array, const std::string& frame) {
   return sensor_of_json("{" + array + R"(,"pressed":"higher","range":[0,1000],"frame":)" + frame + "}",
@@ -201,5 +198,4 @@ TEST(SensorDecoder, MutatedStreamsGiveFramesOrNone) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::sensor_decoder_test

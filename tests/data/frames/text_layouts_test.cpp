@@ -1,15 +1,12 @@
 // Layouts of text that nobody chose: drawn from a seed, probed, and read by the draft.
-#include <gtest/gtest.h>
-
-#include <cmath>
 
 #include "data/frames/probe.h"
 #include "data/frames/sensor_decoder.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::text_layouts_test {
 
 struct TextLayout {
   std::string what;
@@ -375,5 +372,4 @@ TEST(TextLayouts, HabitsOfFirmwareAreNeverWrong) { expect_right_or_refused(third
 TEST(TextLayouts, ExportsAreNeverWrong) { expect_right_or_refused(fourth_layout_of, 48, 0.45); }
 TEST(TextLayouts, OfObjectsAndSeveralArraysToo) { expect_right_or_refused(second_layout_of, 40, 0.85); }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::text_layouts_test

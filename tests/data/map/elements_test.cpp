@@ -1,17 +1,11 @@
 #include "data/map/elements.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <tuple>
-
 #include "data/plates/truth.h"
 #include "io/numbers/median.h"
 #include "io/numbers/random.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::elements_test {
 
 constexpr double kCellMm = 0.75;
 
@@ -163,5 +157,4 @@ TEST(Elements, HoldTheirPlaceWithinWhatTheySay) {
     EXPECT_LE(std::abs(found[i].y_mm - truth[i].y_mm), found[i].y_off_mm);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::elements_test

@@ -1,17 +1,10 @@
 #include "data/map/map_file.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <filesystem>
-#include <map>
-
 #include "data/plates/stl.h"
 #include "io/files/safetensors.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::map_file_test {
 
 NamedMap small_map() {
   SurfaceMap map(ImageGrid{4, 4, Pitch(1, 2)});
@@ -73,5 +66,4 @@ TEST_F(MapFiles, SaysWhatIsWrong) {
   EXPECT_ERROR(write_maps(path(".png"), {}), std::invalid_argument, "expected at least one, got none");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::map_file_test

@@ -1,15 +1,9 @@
 #include "data/map/surface_map.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-
 #include "io/numbers/random.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::surface_map_test {
 
 const ImageGrid kGrid{8, 6, Pitch(0.5, 0.75)};
 
@@ -161,5 +155,4 @@ TEST(SurfaceMap, SaysWhatIsWrong) {
   EXPECT_TRUE(std::isnan(read[0]));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::surface_map_test

@@ -1,14 +1,9 @@
 #include "data/plates/height_map.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "io/files/file.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::height_map_test {
 
 using PlatePoint = std::array<float, 3>;
 
@@ -109,5 +104,4 @@ TEST(HeightMap, RefusesOtherSizesHolesAndOverlaps) {
   expect_map_refused(point, "measures 0.00 x 0.00 mm");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::height_map_test

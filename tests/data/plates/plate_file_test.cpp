@@ -1,18 +1,12 @@
 #include "data/plates/plate_file.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "data/plates/plate_mesh.h"
 #include "data/windows/windows.h"
 #include "io/files/file.h"
 #include "tests/data/test_recordings.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::plate_file_test {
 
 void write_plate(const std::string& path, const std::string& name) {
   write_file(path, stl_bytes(mesh_of(Plate::named(name), {.resolution_mm = 0.25}), name));
@@ -78,5 +72,4 @@ TEST(PlateFile, WindowsTakeTheirTruthFromIt) {
   EXPECT_NE(WindowSet::load(folder.path(), {}, {.timesteps = 32}).fingerprint(), before);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::plate_file_test

@@ -1,18 +1,10 @@
 #include "data/plates/plate_mesh.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <map>
-#include <numbers>
-#include <utility>
-
 #include "data/plates/height_map.h"
 #include "io/numbers/random.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::plate_mesh_test {
 
 using Point = std::array<float, 3>;
 
@@ -127,5 +119,4 @@ TEST(PlateMesh, UniformPlatesAreSmallAndSettingsAreChecked) {
             "mesh_of: expected a resolution of 0.02 to 5 mm and a base of 0.2 to 100 mm, got 0.125 and -1");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::plate_mesh_test

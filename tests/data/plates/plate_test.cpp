@@ -1,15 +1,8 @@
 #include "data/plates/plate.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <cmath>
-#include <numbers>
-#include <stdexcept>
-
-#include "tests/expect_error.h"
-
-namespace supertac {
-namespace {
+namespace supertac::plates_plate_test {
 
 struct RigRow {
   const char* name;
@@ -119,5 +112,4 @@ TEST(Plate, RefusesNamesItCannotRead) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::plates_plate_test

@@ -1,14 +1,9 @@
 #include "data/plates/random_plate.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <map>
-
 #include "io/numbers/hash.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::random_plate_test {
 
 TEST(RandomPlate, IsWhatItsNumberSays) {
   for (const std::uint32_t number : {0U, 7U, 4'000'000'000U}) {
@@ -93,5 +88,4 @@ TEST(RandomPlate, ResemblanceIsKindAndPitch) {
   EXPECT_FALSE(resembles("plain", "3_Bumps"));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::random_plate_test

@@ -1,22 +1,14 @@
 #include "data/plates/stl.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <cctype>
-#include <cstring>
 #include <ctime>
-#include <filesystem>
-#include <limits>
 
 #include "io/files/file.h"
-#include "tests/expect_error.h"
 #include "tests/fuzz/corpus.h"
 #include "tests/fuzz/stl_properties.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::stl_test {
 
 using Bytes = std::vector<std::byte>;
 
@@ -146,5 +138,4 @@ TEST(Stl, FilesAreReadWithALimit) {
 
 TEST(Stl, FuzzCorpus) { EXPECT_GE(replay("stl", check_stl), 256); }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::stl_test

@@ -1,15 +1,8 @@
 #include "data/plates/truth.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <stdexcept>
-#include <utility>
-#include <vector>
-
-#include "tests/expect_error.h"
-
-namespace supertac {
-namespace {
+namespace supertac::truth_test {
 
 std::vector<float> image_at(const Plate& plate, double x, double y, int size) {
   std::vector<float> image(static_cast<std::size_t>(size * size));
@@ -95,5 +88,4 @@ TEST(Truth, RefusesAnImageOfTheWrongSize) {
             "for 0");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::truth_test

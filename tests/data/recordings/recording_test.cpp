@@ -1,18 +1,11 @@
 #include "data/recordings/recording.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
 #include "tests/data/test_recordings.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::recording_test {
 
 Recording example() {
   Recording recording = make_recording({.plate = "3_Bumps", .trial = 2, .pass = 5, .frames = 7});
@@ -206,5 +199,4 @@ TEST(Recording, ListsAFolderByName) {
             (std::vector<std::string>{folder.file("a.safetensors"), folder.file("b.safetensors")}));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::recording_test

@@ -1,16 +1,9 @@
 #include "data/recordings/resample.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <stdexcept>
-
 #include "tests/data/test_recordings.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::resample_test {
 
 const ResampleSettings kWideRange{.scaling = Scaling{.rest = 3.0, .span = 2.0}};
 
@@ -148,5 +141,4 @@ TEST(Resample, RefusesTimesThatDoNotIncreaseAndSizesThatDisagree) {
             "0.360000");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::resample_test

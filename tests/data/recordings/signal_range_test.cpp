@@ -1,15 +1,9 @@
 #include "data/recordings/signal_range.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "data/simulation/simulator.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::signal_range_test {
 
 // One long recording whose signals run evenly from low to high.
 Recording even(double low, double high) {
@@ -96,5 +90,4 @@ TEST(SignalRange, LeavesOutWhatIsNoNumber) {
   EXPECT_EQ(SignalRange().fitted().span, Scaling{}.span);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::signal_range_test

@@ -1,18 +1,10 @@
 #include "data/registration/alignment.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <stdexcept>
-#include <vector>
-
 #include "data/registration/lost_frames.h"
 #include "tests/data/registration/lossy_pass.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::alignment_test {
 
 struct Pass {
   Recording recording;
@@ -176,5 +168,4 @@ TEST(Alignment, AnotherArrayIsRefused) {
             "align_passes: expected recordings of the rig's 4x4 taxels at 3 mm, got 4x4 taxels at 2 mm");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::alignment_test

@@ -1,13 +1,9 @@
 #include "data/registration/apply_registration.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "tests/data/registration/lossy_pass.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::apply_registration_test {
 
 TEST(ApplyRegistration, FillsPositionsAndStretchesANominalClock) {
   Recording recording = like_the_rig("3_Bumps", 4, 9);
@@ -78,5 +74,4 @@ TEST(ApplyRegistration, PositionsAreLimitedToThePlateAndToWhatWasFitted) {
   EXPECT_EQ(r.metadata.at("registration_reliable"), "no");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::apply_registration_test

@@ -1,15 +1,8 @@
 #include "data/registration/contacts.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <cmath>
-#include <limits>
-#include <stdexcept>
-
-#include "tests/expect_error.h"
-
-namespace supertac {
-namespace {
+namespace supertac::contacts_test {
 
 // Triangular dips of half-width 0.2 s on taxel 6, everything else at rest.
 Recording dips(const std::vector<double>& centres, double depth, double floor = 0) {
@@ -65,5 +58,4 @@ TEST(Contacts, RefusesArraysThatDoNotFit) {
             "find_contacts: time stamps must increase and span at most 10000 s, got a span of 1e+09 s");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::contacts_test

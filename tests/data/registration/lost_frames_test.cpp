@@ -1,15 +1,9 @@
 #include "data/registration/lost_frames.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include "tests/data/registration/lossy_pass.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::lost_frames_test {
 
 // How far the best straight line y(time_s) is from the true positions between y = 28 and 80: what an uneven
 // clock costs any registration (mm, the worst).
@@ -96,5 +90,4 @@ TEST(LostFrames, DeadAndSaturatedTaxelsDoNotHideThem) {
   EXPECT_LT(unevenness(recording), 0.5 * before);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::lost_frames_test

@@ -1,19 +1,12 @@
 #include "data/registration/registration.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <utility>
-
 #include "data/recordings/imports/text_import.h"
 #include "data/registration/apply_registration.h"
 #include "data/registration/lost_frames.h"
 #include "tests/data/registration/lossy_pass.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::registration_test {
 
 struct Error {
   double mean = 0, worst = 0;  // mm, over y = 28..80
@@ -289,5 +282,4 @@ TEST(Registration, ABurstCutsPassesOfOtherArraysToo) {
   EXPECT_NEAR(r.valid_until_s, cut.time_s[at], 0.02);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::registration_test

@@ -1,16 +1,9 @@
 #include "data/scores/baselines.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <stdexcept>
-#include <vector>
-
 #include "tests/data/scores/surface_windows.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::baselines_test {
 
 std::vector<float> upsampled(const std::vector<float>& frame, int size = 16) {
   std::vector<float> out(static_cast<std::size_t>(size * size));
@@ -153,5 +146,4 @@ TEST(Baselines, NeedWindowsToFitTo) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::baselines_test

@@ -1,17 +1,12 @@
 #include "data/scores/metrics.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <nlohmann/json.hpp>
-#include <vector>
 
 #include "data/plates/truth.h"
 #include "io/numbers/random.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::metrics_test {
 
 using Image = std::vector<float>;
 
@@ -253,5 +248,4 @@ TEST(ZoneMetrics, ReportsContactApart) {
   EXPECT_EQ(metrics.to_json()["contact"]["windows"], 1);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::metrics_test

@@ -1,15 +1,10 @@
 #include "data/scores/phase_correlation.h"
 
-#include <gtest/gtest.h>
-
-#include <vector>
-
 #include "data/plates/truth.h"
 #include "io/numbers/random.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::phase_correlation_test {
 
 std::vector<float> image_of(const char* plate, double x, double y, int size = 16) {
   std::vector<float> image(static_cast<std::size_t>(size * size));
@@ -146,5 +141,4 @@ TEST(PhaseCorrelation, TakesEverySizeOfPicture) {
     }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::phase_correlation_test

@@ -1,17 +1,12 @@
 #include "data/scores/baselines.h"
 
-#include <gtest/gtest.h>
 #include <omp.h>
-
-#include <algorithm>
-#include <cstring>
 
 #include "data/windows/split.h"
 #include "tests/data/scores/surface_windows.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::ridge_test {
 
 constexpr int kSteps = 16;
 
@@ -115,5 +110,4 @@ TEST(Ridge, RefusesNoWindows) {
             "ridge: there is no window to fit to");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::ridge_test

@@ -1,17 +1,9 @@
 #include "data/scores/statistics.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <stdexcept>
-#include <vector>
-
 #include "io/numbers/random.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::statistics_test {
 
 TEST(Share, CountsFramesNotPasses) {
   const ClusterCount counts[] = {{1, 10}, {90, 90}};
@@ -100,5 +92,4 @@ TEST(SignFlip, RefusesNothingAndWhatIsNoNumber) {
             "sign_flip_p: expected finite differences, got inf");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::statistics_test

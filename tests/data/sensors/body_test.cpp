@@ -1,16 +1,11 @@
 #include "data/sensors/body.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <nlohmann/json.hpp>
-#include <vector>
 
 #include "data/sensors/sensor.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::body_test {
 
 const TaxelArray kTwo = {.rows = 2, .columns = 2, .pitch_mm = 5};
 
@@ -92,5 +87,4 @@ TEST(BodyResponse, CrosstalkRunsAlongRowsAndColumns) {
   EXPECT_TRUE(BodyResponse({.skin_mm = 2, .knee = {}, .noise = 0.1}, kTwo).neutral());
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::body_test

@@ -1,14 +1,9 @@
 #include "data/sensors/layout.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "io/numbers/random.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::layout_test {
 
 struct Pressing {
   int rows, columns;
@@ -105,5 +100,4 @@ TEST(Layout, SaysHowFramesAreSent) {
   EXPECT_NE(found.says.find("whether it is mirrored or turned can never be told so"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::layout_test

@@ -1,15 +1,9 @@
 #include "data/sensors/rest_tracker.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <limits>
-
 #include "io/numbers/random.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::rest_tracker_test {
 
 constexpr std::size_t kSignals = 6;
 constexpr double kRest = 100, kRange = 500, kHz = 50;
@@ -144,5 +138,4 @@ TEST(RestTracker, ChangesNothingUnlessTheFileAsks) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::rest_tracker_test

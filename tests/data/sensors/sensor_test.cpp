@@ -1,19 +1,14 @@
 #include "data/sensors/sensor.h"
 #include "data/sensors/frame_load.h"
 
-#include <gtest/gtest.h>
-
 #include <nlohmann/json.hpp>
 #include <random>
-#include <tuple>
 
 #include "io/files/file.h"
-#include "tests/expect_error.h"
 #include "tests/hardware/fake_sensor.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::sensor_test {
 
 using Json = nlohmann::ordered_json;
 
@@ -267,5 +262,4 @@ TEST(FrameLoad, AddsSharesOfTheRangeAndCountsItsEnds) {
   EXPECT_EQ(of_three.saturated, 1U);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::sensor_test

@@ -1,18 +1,13 @@
 // Unit and polarity on the way from a recording to windows.
-#include <gtest/gtest.h>
-
-#include <cmath>
 
 #include "data/recordings/signal_range.h"
 #include "data/simulation/simulator.h"
 #include "data/windows/random_passes.h"
 #include "data/windows/windows.h"
 #include "io/files/file.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::units_test {
 
 const SignalScale kCounts{.unit = "counts", .rest = 1000, .span = -16'000'000};
 
@@ -81,5 +76,4 @@ TEST(Units, RandomPassesSpeakTheSensorsLanguage) {
   EXPECT_LT(most, 1.0F);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::units_test

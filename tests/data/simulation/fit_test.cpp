@@ -1,16 +1,12 @@
 #include "data/simulation/fit.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "data/simulation/presses.h"
 #include "io/numbers/random.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::fit_test {
 
 Sensor mat_to_fit() {
   Sensor sensor;
@@ -85,5 +81,4 @@ TEST(BodyFit, FindsKnownBodiesWithinTheStatedUncertainty) {
             "and there for half a minute, or let the probe find the range");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::fit_test

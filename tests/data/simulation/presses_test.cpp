@@ -1,18 +1,10 @@
 #include "data/simulation/presses.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <numeric>
-#include <span>
-
 #include "data/recordings/felt_taxels.h"
 #include "data/simulation/scene.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::presses_test {
 
 Sensor mat(int rows = 6, int columns = 10) {
   Sensor sensor;
@@ -165,5 +157,4 @@ TEST(FeltTaxels, NamesThoseThatASimulationNeverReached) {
   EXPECT_EQ(real.complaint(), "") << "a real array may not have been pressed everywhere";
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::presses_test

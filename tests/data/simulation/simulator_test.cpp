@@ -1,17 +1,10 @@
 #include "data/simulation/simulator.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <stdexcept>
-#include <utility>
 
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::simulator_test {
 
 struct Term {
   const char* name;
@@ -281,5 +274,4 @@ TEST(FingerModel, TheMountLiftsTheOtherRowsOffThePlate) {
   EXPECT_GT(FingerModel(plate, yielding, {}).loads({.x_mm = 18, .y_mm = 20, .z_mm = -0.35})[0], 0.01);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::simulator_test

@@ -1,16 +1,8 @@
 #include "data/windows/batching.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <algorithm>
-#include <numeric>
-#include <set>
-#include <vector>
-
-#include "tests/expect_error.h"
-
-namespace supertac {
-namespace {
+namespace supertac::batching_test {
 
 TEST(EpochOrder, IsAPermutationOfAnyCount) {
   for (const std::uint64_t count : {1U, 2U, 3U, 4U, 5U, 16U, 17U, 1000U, 4097U}) {
@@ -120,5 +112,4 @@ TEST(Batching, RefusesWhatIsNotThere) {
             "batching: expected a batch below 6 and room for 16 windows, got batch 0 and room for 15");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::batching_test

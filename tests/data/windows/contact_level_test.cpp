@@ -1,14 +1,9 @@
 #include "data/windows/contact_level.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <vector>
-
 #include "io/numbers/random.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::contact_level_test {
 
 constexpr std::size_t kPixels = 64, kTruths = 200;
 
@@ -45,5 +40,4 @@ TEST(ContactLevel, IsZeroWhereNothingRests) {
   EXPECT_EQ(contact_level(std::vector<float>(5 * kPixels, 0.02F), kPixels), 0) << "too few frames to tell";
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::contact_level_test

@@ -1,22 +1,13 @@
 #include "data/windows/live_window.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <stdexcept>
-#include <utility>
-
 #include "data/simulation/simulator.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "data/windows/windows.h"
 #include "io/numbers/random.h"
 #include "tests/data/test_recordings.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::live_window_test {
 
 constexpr int kTimesteps = 16;
 const Scaling kWide{.rest = 3.0, .span = 2.0};
@@ -228,5 +219,4 @@ TEST(LiveWindow, RefusesSettingsOutOfRangeAndAWrongRoom) {
             "live window: needs room for 256 values, got 10");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::live_window_test

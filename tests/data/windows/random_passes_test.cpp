@@ -1,16 +1,10 @@
 #include "data/windows/random_passes.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-
 #include "data/simulation/simulator.h"
 #include "data/windows/split.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::random_passes_test {
 
 WindowSettings small() {
   WindowSettings settings;
@@ -163,5 +157,4 @@ TEST(SilentPasses, AreTheSameForTheSameSeedAndFitAnyArrayAndRange) {
   EXPECT_GT(highest, 0.9F);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::random_passes_test

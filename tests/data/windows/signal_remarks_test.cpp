@@ -1,13 +1,9 @@
 #include "data/windows/signal_remarks.h"
 
-#include <gtest/gtest.h>
-
-#include <numeric>
-
 #include "data/simulation/simulator.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::signal_remarks_test {
 
 using Remarks = std::vector<std::string>;
 
@@ -60,5 +56,4 @@ TEST(SignalRemarks, NameTruthsThatShowNothing) {
             Remarks{"every truth is 0 everywhere: nothing can be learnt or scored in contact"});
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::signal_remarks_test

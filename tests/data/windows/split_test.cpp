@@ -1,21 +1,10 @@
 #include "data/windows/split.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <iterator>
-#include <numeric>
-#include <set>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
 #include "data/simulation/simulator.h"
 #include "tests/data/test_recordings.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::split_test {
 
 constexpr PassUse kTrainingOnly{.training_only = true};
 constexpr PassUse kOneOfMany{.training_only = true, .augmentable = false, .stride = 8};
@@ -276,5 +265,4 @@ TEST(Split, GroupKeepsGroupsTogether) {
             "on, one to test on; some have none: use split pass");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::split_test

@@ -1,22 +1,12 @@
 #include "data/windows/windows.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
 #include "data/plates/truth.h"
 #include "data/scores/baselines.h"
 #include "data/simulation/simulator.h"
 #include "tests/data/test_recordings.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::windows_test {
 
 std::size_t sum_of_reasons(const WindowCounts& c) {
   return c.unreliable + c.no_position + c.lifting + c.too_early + c.off_stride + c.windows;
@@ -382,5 +372,4 @@ TEST_F(WindowFiles, SayWhatIsMissing) {
                "100 too close to the start");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::windows_test

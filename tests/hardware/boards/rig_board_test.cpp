@@ -1,6 +1,5 @@
 #include "hardware/boards/sensor_reader.h"
 
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include "hardware/boards/listen.h"
@@ -8,12 +7,11 @@
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
 #include "hardware/printers/marlin_link.h"
-#include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
 #include "tests/hardware/virtual_rig/rig_world.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::rig_board_test {
 
 constexpr double kPatience = 20;  // seconds of wall time; a loaded machine is no failure
 
@@ -242,5 +240,4 @@ TEST(RigBoard, ABoardAtThePrintersPortIsRecognised) {
   EXPECT_ERROR(link.connect(), WrongDevice, "found no text, as from a tactile board; exchange the two ports");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::rig_board_test

@@ -2,24 +2,19 @@
 
 #include <arpa/inet.h>
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <pty.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cmath>
-
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
-#include "tests/expect_error.h"
 #include "tests/hardware/fake_sensor.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::sensor_reader_test {
 
 std::vector<double> numbered(const Sensor& sensor, int frame) {
   std::vector<double> values(sensor.values(), 7);
@@ -256,5 +251,4 @@ TEST(SensorReader, WhatComesWithoutAFrameIsSaid) {
   for (const int end : {slave, master}) close(end);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::sensor_reader_test

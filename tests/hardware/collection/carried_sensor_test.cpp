@@ -1,22 +1,18 @@
 // Collections with another sensor than the rig's board, on another bed: a text sensor of 100 Hz rides on the
 // simulated rig's head, and every frame carries its number.
-#include <gtest/gtest.h>
-
-#include <array>
 
 #include "data/frames/frame_decoder.h"
 #include "hardware/collection/collection.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
-#include "tests/expect_error.h"
 #include "tests/fuzz/journal_properties.h"
 #include "tests/hardware/fake_sensor.h"
 #include "tests/hardware/numbered_board.h"
 #include "tests/hardware/rig_support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::carried_sensor_test {
 
 constexpr int kEvery = 10;  // board frames a frame of the sensor
 
@@ -309,5 +305,4 @@ TEST(CarriedSensor, NothingMovesBeforeItIsHeard) {
   EXPECT_EQ(run.folder.entries(), 0U) << "a journal of nothing was left behind";
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::carried_sensor_test

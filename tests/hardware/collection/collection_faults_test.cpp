@@ -1,8 +1,6 @@
 // The N-th call on the journal's file fails, for every N of a short collection.
-#include <gtest/gtest.h>
 
 #include <chrono>
-#include <filesystem>
 #include <thread>
 
 #include "hardware/collection/collection.h"
@@ -10,9 +8,9 @@
 #include "hardware/ports/errors.h"
 #include "tests/hardware/rig_support.h"
 #include "tests/io/faults.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::collection_faults_test {
 
 constexpr Point3 kLowAt{99.7, 101.17, 97.81};
 
@@ -113,5 +111,4 @@ TEST(CollectionFaults, ShortWritesAreCompleted) {
   EXPECT_FALSE(failed);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::collection_faults_test

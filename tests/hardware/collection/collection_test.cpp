@@ -1,15 +1,12 @@
 #include "hardware/collection/collection.h"
 
-#include <gtest/gtest.h>
-
 #include "hardware/collection/capture.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/ports/errors.h"
-#include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::collection_test {
 
 /// A collection on the simulated rig. Where its frames stand is compared with the truth in stalls_test.cpp.
 struct CollectionBench {
@@ -83,5 +80,4 @@ TEST(Collection, WhatWasSetIsPutBackWhereverTheRunEnds) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::collection_test

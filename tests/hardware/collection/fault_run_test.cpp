@@ -1,11 +1,9 @@
 #include "tests/hardware/fault_run.h"
 
-#include <gtest/gtest.h>
-
 #include "tests/hardware/rig_support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::fault_run_test {
 
 RigSettings faulty(const RigFaults& faults, std::uint64_t seed, Firmware firmware = Firmware::marlin) {
   RigSettings rig = running_rig({.firmware = firmware}, faults);
@@ -45,5 +43,4 @@ TEST(FaultRun, EverythingAtOnceIsNeverAFalseDone) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::fault_run_test

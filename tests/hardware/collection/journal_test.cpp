@@ -1,23 +1,20 @@
 #include "hardware/collection/journal.h"
 
-#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <fstream>
-#include <functional>
 
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 #include "io/numbers/clock.h"
-#include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
 #include "tests/io/faults.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::journal_test {
 
 std::vector<std::byte> file_bytes(const std::string& path) { return read_file(path, 1 << 30); }
 
@@ -169,5 +166,4 @@ TEST(Journal, WhatIsAppendedReachesTheFileByItselfAndAKillLeavesAWholeBeginning)
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::journal_test

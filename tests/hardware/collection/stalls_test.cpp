@@ -1,13 +1,12 @@
 // Collections on a rig, a board or a host that stands still for a while: every recording is right, or says
 // that it is not. Frames are compared with the truth by the number they carry.
-#include <gtest/gtest.h>
 
 #include "hardware/collection/collection.h"
 #include "tests/hardware/fault_run.h"
 #include "tests/hardware/rig_support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::stalls_test {
 
 constexpr Point3 kLow{99.7, 101.17, 99.81};  // three millimetres above the finger's height between passes
 
@@ -137,5 +136,4 @@ TEST(StalledCollections, OfTheHostAreRightOrSaySo) {
   EXPECT_GT(tally.right, 20);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::stalls_test

@@ -1,5 +1,4 @@
 // A plug that is pulled, through the kernel's pseudo-terminals: a typed error, and where the finger is left.
-#include <gtest/gtest.h>
 
 #include <atomic>
 #include <chrono>
@@ -9,9 +8,9 @@
 #include "hardware/ports/serial_port.h"
 #include "tests/hardware/rig_support.h"
 #include "tests/hardware/virtual_rig/rig_world.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::unplug_run_test {
 
 using Finger = PalpationOutcome::Finger;
 
@@ -80,5 +79,4 @@ TEST(UnplugRun, ACollectionEndsWithATypedErrorAndTheFingerUp) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::unplug_run_test

@@ -1,15 +1,12 @@
 #include "hardware/ports/serial_port.h"
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/stat.h>
 #include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
-#include <filesystem>
 #include <fstream>
 #include <thread>
 
@@ -17,11 +14,10 @@
 #include "hardware/ports/port_list.h"
 #include "hardware/ports/serial_termios.h"
 #include "hardware/virtual_rig/pty_rig.h"
-#include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::serial_port_test {
 
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
 
@@ -179,5 +175,4 @@ TEST(SerialPort, OutputIsByteExactUnderAStormOfSignals) {
   EXPECT_EQ(got, sent);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::serial_port_test

@@ -1,14 +1,11 @@
 #include "hardware/printers/bed.h"
 
-#include <gtest/gtest.h>
-
 #include <nlohmann/json.hpp>
 
 #include "io/files/file.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::bed_test {
 
 constexpr const char* kLeast = R"({"plate": [60, 40, 30], "origin": [60, 40, 70], "high": [180, 180, 180]})";
 
@@ -85,5 +82,4 @@ TEST(Bed, TheExampleIsRead) {
   EXPECT_NO_THROW(legs_of(bed.plan, bed.origin, bed.limits));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::bed_test

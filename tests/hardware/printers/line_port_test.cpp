@@ -1,11 +1,8 @@
 #include "hardware/printers/line_port.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <algorithm>
-
-namespace supertac {
-namespace {
+namespace supertac::line_port_test {
 
 /// Says `text` over and over, 100 bytes a millisecond.
 class Talker : public Port {
@@ -48,5 +45,4 @@ TEST(LinePort, GivesLinesWithoutBreaksBlanksAndEmptyOnes) {
   EXPECT_GT(lines.no_text(), 0U);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::line_port_test

@@ -1,14 +1,11 @@
 // Printers as another job, a display or a start of their own left them.
 #include "hardware/printers/machine_state.h"
 
-#include <gtest/gtest.h>
-
-#include "tests/expect_error.h"
 #include "tests/hardware/fault_run.h"
 #include "tests/hardware/rig_support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::machine_state_test {
 
 constexpr Firmware kFirmwares[] = {Firmware::marlin, Firmware::marlin_before_2_1_2, Firmware::klipper};
 constexpr Point3 kLowDown{99.7, 101.17, 99.81};
@@ -245,5 +242,4 @@ TEST(MachineState, AnotherAccelerationIsMeasured) {
     }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::machine_state_test

@@ -1,16 +1,11 @@
 #include "hardware/printers/marlin_line.h"
 
-#include <gtest/gtest.h>
-
 #include <clocale>
-#include <string>
-#include <vector>
 
-#include "tests/expect_error.h"
 #include "tests/hardware/virtual_rig/virtual_printer.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::marlin_line_test {
 
 TEST(MarlinLine, NumberedLineCarriesItsXor) {
   // 'N'^'1'^' '^'M'^'1'^'1'^'5' by hand: 0x26 = 38
@@ -100,5 +95,4 @@ TEST(MarlinLine, ADamagedPositionIsNoPosition) {
   EXPECT_EQ(parse_reply("X:99.70 Y:101.17 ").kind, ReplyKind::other);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::marlin_line_test

@@ -1,15 +1,9 @@
 #include "hardware/printers/marlin_link.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <functional>
-
-#include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::marlin_link_test {
 
 constexpr std::int64_t kConnecting = 1;  // lines that connecting sends: M115
 
@@ -295,5 +289,4 @@ TEST(MarlinLink, EveryLineRunsOnceInOrderAtFiftyTimesTheUsualFaults) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::marlin_link_test

@@ -1,12 +1,9 @@
 #include "hardware/printers/palpation.h"
 
-#include <gtest/gtest.h>
-
-#include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::palpation_test {
 
 using rig::kMounted;
 
@@ -129,5 +126,4 @@ TEST(Palpation, TheStartDelayIsSeenInThePositions) {
   EXPECT_NEAR(first_motion, 0.135, 0.02);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::palpation_test

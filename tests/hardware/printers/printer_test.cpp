@@ -1,15 +1,10 @@
 #include "hardware/printers/printer.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "hardware/printers/limits.h"
-#include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::printer_test {
 
 using rig::kMounted;
 
@@ -173,5 +168,4 @@ TEST(Printer, EmergencyStopIsConfirmedByTheHalt) {
   EXPECT_THROW(bench.printer.start_move({99.7, 101.17, 131.81}, 10), OriginUnknown);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::printer_test

@@ -1,14 +1,10 @@
 // What real Marlin firmware did and the drivers did not expect.
-#include <gtest/gtest.h>
-
-#include <algorithm>
 
 #include "hardware/printers/palpation.h"
-#include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::real_marlin_test {
 
 TEST(RealMarlin, ReportsOfAnEarlierHostAreSwitchedOff) {
   const RigSettings settings = running_rig({.auto_position_s = 0.013, .auto_temperature_s = 0.017});
@@ -146,5 +142,4 @@ TEST(VirtualPrinter, SpeaksLikeTheRealOne) {
   EXPECT_EQ(say("M112\n", 0.1), "echo:M112 Shutdown\nError:Printer halted. kill() called!\n");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::real_marlin_test

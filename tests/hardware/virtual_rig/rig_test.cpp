@@ -1,12 +1,10 @@
 #include "data/sensors/rig.h"
 
-#include <gtest/gtest.h>
-
 #include "hardware/printers/marlin_line.h"
 #include "hardware/virtual_rig/virtual_rig.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::virtual_rig_rig_test {
 
 TEST(Rig, NumbersFitEachOther) {
   EXPECT_EQ(rig::kFramePeriodS, 992e-6);
@@ -51,5 +49,4 @@ TEST(PlainRig, RunsNoDamagedLineAndKnowsTheModesOfOtherJobs) {
   EXPECT_TRUE(said(numbered_line(++number, "M114 R")).starts_with("X:35.40 Y:50.80 Z:0")) << "twice as fast";
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::virtual_rig_rig_test

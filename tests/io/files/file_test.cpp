@@ -1,20 +1,16 @@
 #include "io/files/file.h"
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <fstream>
 
-#include "tests/expect_error.h"
 #include "tests/io/faults.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::file_test {
 
 constexpr std::uint64_t kPlenty = 1 << 20;
 const std::string kOld = "the old content";
@@ -253,5 +249,4 @@ TEST(FileCrash, AlwaysOldOrNew) {
   EXPECT_EQ(FaultInjection::calls(), expected);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::file_test

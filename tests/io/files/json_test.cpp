@@ -1,11 +1,8 @@
 #include "io/files/json.h"
 
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-#include <gtest/gtest.h>
-
-namespace supertac {
-namespace {
+namespace supertac::json_test {
 
 std::string message_of(const std::string& text, const JsonLimits& limits = {}) {
   return what_of<JsonError>([&] { parse_json_limited(text, limits); });
@@ -39,5 +36,4 @@ TEST(Json, KeepsItsLimits) {
   EXPECT_EQ(message_of("[1,2,3]", {.max_bytes = 6}), "has 7 bytes, expected at most 6");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::json_test

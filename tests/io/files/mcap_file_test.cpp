@@ -2,17 +2,11 @@
 // tests/python/tools_test.py asks the public readers.
 #include "io/files/mcap_file.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstring>
-
 #include "io/numbers/hash.h"
 #include "tests/io/faults.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::mcap_file_test {
 
 class Reader {
  public:
@@ -203,5 +197,4 @@ TEST(McapFile, AfterAFailedWriteThereIsNoFile) {
   EXPECT_EQ(folder.entries(), 0U);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::mcap_file_test

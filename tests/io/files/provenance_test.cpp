@@ -1,13 +1,10 @@
 #include "io/files/provenance.h"
 
-#include <gtest/gtest.h>
-
 #include "io/files/file.h"
 #include "io/numbers/sha256.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::provenance_test {
 
 std::string bytes_of(const std::string& path) { return read_text_file(path, 1 << 20); }
 
@@ -36,5 +33,4 @@ TEST_F(Provenance, IsInEveryFileAndNotInItsContent) {
   EXPECT_NE(content_hash(SafetensorsFile::read(other)), sha256(bytes_of(without)));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::provenance_test

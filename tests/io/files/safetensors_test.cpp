@@ -1,21 +1,16 @@
 #include "io/files/safetensors.h"
 
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <cstring>
 #include <ctime>
-#include <tuple>
 
 #include "io/files/file.h"
 #include "io/numbers/random.h"
-#include "tests/expect_error.h"
 #include "tests/io/faults.h"
-#include "tests/io/temporary_folder.h"
 #include "tests/sanitized.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::safetensors_test {
 
 constexpr std::uint64_t kMost = 1 << 26;
 
@@ -311,5 +306,4 @@ TEST(Safetensors, NamesTheFirstOfManyTensors) {
   EXPECT_TRUE(text.ends_with("'tensor114', 'tensor115', ...)")) << text;
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::safetensors_test

@@ -1,18 +1,10 @@
 #include "io/files/scratch_file.h"
 
-#include <gtest/gtest.h>
-
-#include <cstdlib>
-#include <filesystem>
-#include <numeric>
-#include <vector>
-
 #include "io/files/file.h"
 #include "tests/io/faults.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::scratch_file_test {
 
 std::vector<float> numbers(std::size_t count, float first) {
   std::vector<float> all(count);
@@ -57,5 +49,4 @@ TEST_F(ScratchFiles, FailWithAnErrorWhateverCallFails) {
     }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::scratch_file_test

@@ -1,11 +1,8 @@
 #include "io/images/captions.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <set>
-
-namespace supertac {
-namespace {
+namespace supertac::captions_test {
 
 constexpr Rgb kBlack = {0, 0, 0}, kWhite = {255, 255, 255};
 
@@ -50,5 +47,4 @@ TEST(Captions, StandAroundThePictureWithAColourBar) {
   EXPECT_EQ(colours.size(), 256U + 3);  // the bar, red, black and white
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::captions_test

@@ -1,23 +1,14 @@
 #include "io/images/images.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <filesystem>
-#include <limits>
-#include <string>
-#include <vector>
-
 #include "io/files/file.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
 #define STB_IMAGE_STATIC
 #define STB_IMAGE_IMPLEMENTATION
 #define STBI_ONLY_PNG
 #include <stb/stb_image.h>
 
-namespace supertac {
-namespace {
+namespace supertac::images_test {
 
 // CIE lightness L* of an sRGB colour.
 double lightness(Rgb colour) {
@@ -160,5 +151,4 @@ TEST(Png, NamesAPathThatCannotBeWritten) {
   EXPECT_ERROR(write_png("/nowhere/at/all.png", Picture(2, 2)), FileError, "/nowhere/at/all.png: ");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::images_test

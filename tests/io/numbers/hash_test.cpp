@@ -1,11 +1,8 @@
 #include "io/numbers/hash.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <string_view>
-
-namespace supertac {
-namespace {
+namespace supertac::hash_test {
 
 std::uint32_t sum_of(std::string_view text, std::uint32_t seed = 0) {
   return crc32(std::as_bytes(std::span(text)), seed);
@@ -32,5 +29,4 @@ TEST(Hash, MixGivesTheFirstNumbersOfSplitMix64) {  // of seed 0
 
 TEST(Hash, HexHasAllSixteenDigits) { EXPECT_EQ(Hash(0x0123456789abcdefULL).hex(), "0123456789abcdef"); }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::hash_test

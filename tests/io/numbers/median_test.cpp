@@ -1,11 +1,8 @@
 #include "io/numbers/median.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <vector>
-
-namespace supertac {
-namespace {
+namespace supertac::median_test {
 
 TEST(Median, IsTheMiddleOneOrTheUpperOfTwo) {
   EXPECT_EQ(median(std::vector{5}), 5);
@@ -15,5 +12,4 @@ TEST(Median, IsTheMiddleOneOrTheUpperOfTwo) {
   EXPECT_EQ(median(numbers), 3);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::median_test

@@ -1,15 +1,11 @@
 #include "io/numbers/numbers.h"
 
-#include <gtest/gtest.h>
-
 #include <clocale>
-#include <cmath>
-#include <limits>
 
 #include "io/numbers/text.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::numbers_numbers_test {
 
 TEST(Numbers, ParseTakesTheWholeText) {
   EXPECT_EQ(parse_double("2.3887939453125"), 2.3887939453125);
@@ -49,5 +45,4 @@ TEST(Text, ForeignTextCannotBreakALine) {
   EXPECT_EQ(in_quotes(std::string(100, 'x')), "'" + std::string(60, 'x') + "...'");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::numbers_numbers_test

@@ -1,13 +1,8 @@
 #include "io/numbers/parallel.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <stdexcept>
-#include <string>
-#include <vector>
-
-namespace supertac {
-namespace {
+namespace supertac::parallel_test {
 
 TEST(ParallelFor, RunsAllAndThrowsWhatTheFirstOneThrew) {
   std::vector<int> ran(1000);
@@ -26,5 +21,4 @@ TEST(ParallelFor, RunsAllAndThrowsWhatTheFirstOneThrew) {
   parallel_for(0, [](std::size_t) { FAIL(); });
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::parallel_test

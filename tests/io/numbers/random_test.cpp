@@ -1,11 +1,8 @@
 #include "io/numbers/random.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <cmath>
-
-namespace supertac {
-namespace {
+namespace supertac::random_test {
 
 using Words = std::array<std::uint32_t, 4>;
 
@@ -55,5 +52,4 @@ TEST(Random, DependsOnSeedStreamAndCounterOnly) {
   EXPECT_NE(RandomStream(1, 2).bits(3), RandomStream(1 + (std::uint64_t{1} << 32), 2).bits(3));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::random_test

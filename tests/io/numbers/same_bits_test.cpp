@@ -1,15 +1,9 @@
 #include "io/numbers/same_bits.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <numbers>
-
 #include "io/numbers/random.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::same_bits_test {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -89,5 +83,4 @@ TEST(SameBits, RoughOnesAreNear) {
   EXPECT_NEAR(same_bits::bell(-2, 2), std::exp(-0.5), 0.011);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::same_bits_test

@@ -1,9 +1,8 @@
 #include "io/numbers/sha256.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::sha256_test {
 
 // FIPS 180-4's examples and NIST's million letters.
 TEST(Sha256, KnownAnswers) {
@@ -24,5 +23,4 @@ TEST(Sha256, PartsOfAnySizeGiveTheSame) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::sha256_test

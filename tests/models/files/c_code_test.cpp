@@ -1,21 +1,14 @@
 #include "models/files/c_code.h"
 
 #include <dlfcn.h>
-#include <gtest/gtest.h>
-
-#include <cstdlib>
-#include <map>
-#include <stdexcept>
 
 #include "data/windows/live_window.h"
 #include "io/files/file.h"
 #include "models/inference/compiled/compiled_model.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::c_code_test {
 
 // What was written, compiled by the C compiler of this machine as somebody might who wants it fast.
 class Compiled {
@@ -231,5 +224,4 @@ TEST(CCode, RefusesLayersThatItsSixteenBitsCannotCount) {
                "fewer channels");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::c_code_test

@@ -1,14 +1,9 @@
 #include "models/files/model_file.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
-#include "tests/expect_error.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::model_file_test {
 
 std::string load_error(const std::string& path) {
   return what_of<std::runtime_error>([&] { (void)load_model(path); });
@@ -133,5 +128,4 @@ TEST(ModelFile, KnowsWhichFilterSignalsStillNeed) {
   EXPECT_EQ(mixed.filter_left(0), 0.0);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::model_file_test

@@ -1,18 +1,13 @@
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdlib>
-
+#include "models/files/onnx.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/hash.h"
-#include "models/files/onnx.h"
 #include "models/files/onnx_file.h"
 #include "models/inference/compiled/compiled_model.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::onnx_test {
 
 constexpr Dim kWindows = 1000;
 
@@ -118,5 +113,4 @@ TEST(Onnx, TheWireFormatIsThatOfItsDocumentation) {
                         28));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::onnx_test

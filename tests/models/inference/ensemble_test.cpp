@@ -1,17 +1,9 @@
 #include "models/inference/ensemble.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <stdexcept>
-#include <string>
-
-#include "tests/expect_error.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::ensemble_test {
 
 // Where members differ, the ensemble is less sure than any of them.
 TEST(Ensemble, AveragesPicturesAndAddsTheirVarianceToPredictedErrors) {
@@ -81,5 +73,4 @@ TEST(Ensemble, RefusesNetworksOfOtherInputs) {
       Ensemble({CompiledModel(one), CompiledModel(longer)}));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::ensemble_test

@@ -1,13 +1,9 @@
 // What predicted errors mean, on pixels whose intervals can be written down.
 #include "models/inference/interval.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <cmath>
-#include <vector>
-
-namespace supertac {
-namespace {
+namespace supertac::interval_test {
 
 const float kNaN = std::nanf("");
 
@@ -102,5 +98,4 @@ TEST(IntervalCoverage, PassesCountTheSame) {
   EXPECT_EQ(coverage.found().factor, 20) << "50 least predicted errors are beyond the last bin";
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::interval_test

@@ -1,14 +1,9 @@
 #include "models/inference/novelty.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-
-#include "tests/expect_error.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::novelty_test {
 
 // Features of a plane: the third number is the sum of the other two.
 Tensor plane(Dim n) {
@@ -142,5 +137,4 @@ TEST(SignalFeatures, RefuseAPieceOfAFrame) {
                  signal_features(short_one, TaxelArray{}));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::novelty_test

@@ -1,8 +1,4 @@
 // Single ops against PyTorch (op_cases in tests/parity/make_parity.py): y and the gradients of sum(y * r).
-#include <gtest/gtest.h>
-
-#include <functional>
-#include <optional>
 
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/attention.h"
@@ -13,9 +9,9 @@
 #include "autograd/ops/vae.h"
 #include "layers/checkpoint.h"
 #include "tests/parity/parity.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::ops_parity_test {
 
 using test::counter_numbers;
 
@@ -167,5 +163,4 @@ TEST(OpsParity, Ssim) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::ops_parity_test

@@ -1,18 +1,15 @@
 // Networks against PyTorch (tests/parity/make_parity.py): outputs, loss terms, every gradient and ten steps
 // of Adam whose gradients are clipped. Compiled twice: with real = double every entry agrees to 1e-5 of its
 // own size, in fp32 to 1e-5 of its tensor's largest entry (see Difference), but for the steps of Adam.
-#include <gtest/gtest.h>
 
-#include <map>
-
+#include "tests/parity/parity.h"
 #include "autograd/optimisers/adam.h"
 #include "layers/checkpoint.h"
 #include "models/networks/supertac_model.h"
 #include "models/training/loss/loss.h"
-#include "tests/parity/parity.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::parity_test {
 
 using test::counter_numbers;
 using test::doubles;
@@ -214,5 +211,4 @@ TEST(Parity, FullSizeOutputs) {
   expect_stored("full.sr", doubles(model.infer(input)));
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::parity_test

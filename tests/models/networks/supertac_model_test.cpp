@@ -1,16 +1,10 @@
 #include "models/networks/supertac_model.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <set>
-
 #include "models/networks/classifier.h"
-#include "tests/expect_error.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::supertac_model_test {
 
 TEST(SuperTac, PresetPaperHasTheParametersOfTheTable) {
   const SuperTac model = random_network(SuperTacSettings::of_preset("paper"));
@@ -161,5 +155,4 @@ TEST(TextureClassifier, RefusesSettingsOutOfRange) {
                   got);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::supertac_model_test

@@ -1,17 +1,15 @@
 #include "models/training/ranks.h"
 
-#include <gtest/gtest.h>
 #include <omp.h>
 
 #include <atomic>
 #include <barrier>
 #include <thread>
 
-#include "tests/expect_error.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::training_ranks_test {
 
 using Texts = std::vector<std::string>;
 
@@ -213,5 +211,4 @@ TEST_F(RanksTrain, AllNameTheLayerThatIsNotFinite) {
     EXPECT_NE(error.find("parameter upsampler.out.weight is not finite"), std::string::npos) << error;
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::training_ranks_test

@@ -1,15 +1,10 @@
 #include "models/training/recipe.h"
 
-#include <gtest/gtest.h>
-
-#include <functional>
-
 #include "models/files/model_file.h"
-#include "tests/expect_error.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::recipe_test {
 
 // What a model trained by this recipe says of itself.
 ModelFile file_of(const Recipe& recipe, const std::string& path) {
@@ -97,5 +92,4 @@ TEST(Recipe, AFileThatDoesNotSayItIsRefusedByName) {
                path + ": metadata \"training\" is missing");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::recipe_test

@@ -1,23 +1,16 @@
 #include "models/training/trainer.h"
 
-#include <gtest/gtest.h>
 #include <omp.h>
-
-#include <cmath>
-#include <functional>
-#include <numeric>
-#include <optional>
 
 #include "autograd/kernels/fast/isa/isa.h"
 #include "data/windows/transforms/augment.h"
 #include "io/files/json.h"
 #include "io/numbers/hash.h"
 #include "models/inference/evaluation.h"
-#include "tests/expect_error.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::trainer_test {
 
 TEST(Trainer, Learns) {
   SmallTraining small;
@@ -282,5 +275,4 @@ TEST(Trainer, RefusesWhatTheArrayCannotDo) {
   EXPECT_REFUSAL("augmentation: dropped must be 0 to 16 taxels, got 17", small.trainer());
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::trainer_test

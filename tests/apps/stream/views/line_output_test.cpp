@@ -2,7 +2,6 @@
 #include "apps/stream/views/line_output.h"
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -10,9 +9,9 @@
 #include <fstream>
 
 #include "io/files/json.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::line_output_test {
 
 const std::vector<float> kVolts(16, 2.4F), kPicture(256, 0.5F), kHalf(256, 0.25F);
 
@@ -111,5 +110,4 @@ TEST_F(Pipe, AReaderThatLeavesIsNoticed) {
   EXPECT_THROW(send_on(), std::runtime_error);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::line_output_test

@@ -1,9 +1,6 @@
 // All instruction sets give the same bytes; kernels/conv_test.cpp compares convolutions and linear layers.
 #include "autograd/kernels/fast/isa/isa.h"
 
-#include <algorithm>
-#include <limits>
-
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/attention.h"
@@ -11,6 +8,7 @@
 #include "autograd/ops/vae.h"
 #include "autograd/optimisers/adam.h"
 #include "tests/autograd/check.h"
+#include "tests/support/test.h"
 
 namespace supertac::kernels {
 namespace {

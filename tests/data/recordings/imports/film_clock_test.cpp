@@ -1,17 +1,11 @@
 #include "data/recordings/imports/film_clock.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "data/recordings/imports/film_truth.h"
 #include "io/files/file.h"
 #include "io/numbers/random.h"
-#include "tests/expect_error.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::film_clock_test {
 
 struct Courses {
   std::vector<double> sensor_s, sensor, film_s, film;
@@ -182,5 +176,4 @@ TEST(FilmTruth, TimesOfAnArrayStandInATableOfTheirOwn) {
             "t.csv: has times that do not increase, in row 2");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::film_clock_test

@@ -1,15 +1,9 @@
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "data/recordings/imports/table_import.h"
 #include "data/windows/split.h"
 #include "io/files/file.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::pair_import_test {
 
 /// A file of pairs that a test can spoil before it is written.
 struct PairFile {
@@ -165,5 +159,4 @@ TEST(PairImport, RefusesWhatDoesNotFitTogether) {
       folder / "a" + ": has no tensor 'target'; expected input F32 [N,C,H,W] and target F32 [N,1,sH,sW]");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::pair_import_test

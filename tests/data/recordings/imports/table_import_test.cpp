@@ -1,18 +1,11 @@
 #include "data/recordings/imports/table_import.h"
 
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::table_import_test {
 
 /// Two by two taxels whose counts rise, 100 frames/s.
 Sensor mat_of_tables() {
@@ -284,5 +277,4 @@ TEST_F(TableImport, TruthIsScaledAndCounted) {
             "t: holds 2 images, the recording has 3 frames; expected one for each");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::table_import_test

@@ -1,17 +1,10 @@
 #include "data/recordings/imports/text_import.h"
 
-#include <gtest/gtest.h>
-
-#include <cstdlib>
-#include <utility>
-
 #include "io/files/file.h"
 #include "io/numbers/random.h"
-#include "tests/expect_error.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::text_import_test {
 
 std::string line_of(double first) {
   std::string line;
@@ -142,5 +135,4 @@ TEST(TextImport, RealRecording) {
   EXPECT_EQ(report.frames, 9648u);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::text_import_test

@@ -1,17 +1,8 @@
 #include "data/windows/transforms/augment.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <set>
-#include <vector>
-
-#include "tests/expect_error.h"
-
-namespace supertac {
-namespace {
+namespace supertac::augment_test {
 
 constexpr std::size_t kFrames = 256;
 
@@ -162,5 +153,4 @@ TEST(Augment, AnyArray) {
       "augment: a window of 3x5 taxels at 3 mm with 3 channels is [T][45], got 44 values");
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::augment_test

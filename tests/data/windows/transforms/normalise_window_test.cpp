@@ -1,15 +1,8 @@
 #include "data/windows/transforms/normalise_window.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
-#include <cmath>
-#include <stdexcept>
-#include <vector>
-
-#include "tests/expect_error.h"
-
-namespace supertac {
-namespace {
+namespace supertac::normalise_window_test {
 
 constexpr std::size_t kTimes = 100, kChannels = 2;
 constexpr float kStep = 1.0F / 256;
@@ -107,5 +100,4 @@ TEST(NormaliseWindow, RefusesWhatIsNoWindow) {
   }
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::normalise_window_test

@@ -1,26 +1,16 @@
 #include "models/inference/compiled/compiled_model.h"
 
-#include <gtest/gtest.h>
 #include <omp.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <functional>
-#include <set>
-#include <utility>
-#include <vector>
 
 #include "autograd/kernels/fast/isa/isa.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/random.h"
 #include "models/inference/compiled/compiler.h"
 #include "tests/allocations.h"
-#include "tests/expect_error.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::compiled_model_test {
 
 using kernels::isa_kernels;
 using kernels::supported_sets;
@@ -223,5 +213,4 @@ TEST(NoAllocation, WarmInference) {
   EXPECT_EQ(allocations_of_five([&] { compiled.estimate(one), compiled.estimate(many); }), 0);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::compiled_model_test

@@ -3,16 +3,13 @@
 // judges steps.
 #include "models/training/audit/ledger.h"
 
-#include <gtest/gtest.h>
-
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "models/training/audit/opened_step.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::ledger_test {
 
 struct Entry {
   std::string batches, first, second;
@@ -122,5 +119,4 @@ TEST(OpenedSteps, EveryInputWasMadeBeforeOrIsAConstant) {
   EXPECT_LE(unmade, 8U);  // dL/dL of each micro-batch, which is 1
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::ledger_test

@@ -1,19 +1,12 @@
 #include "models/training/loss/loss.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include "autograd/ops/losses.h"
 #include "models/training/loss/collapse.h"
 #include "models/training/loss/schedule.h"
-#include "tests/expect_error.h"
 #include "tests/models/support.h"
+#include "tests/support/test.h"
 
-namespace supertac {
-namespace {
+namespace supertac::loss_test {
 
 struct Sample {
   SuperTac model = random_network();
@@ -175,5 +168,4 @@ TEST(Schedule, ShorterThanItsWarmUp) {
   EXPECT_DOUBLE_EQ(all_warm_up.at(20), 2);
 }
 
-}  // namespace
-}  // namespace supertac
+}  // namespace supertac::loss_test
