@@ -79,13 +79,13 @@ ReaderCounters FrameReader::counters() const {
 }
 
 SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor, const ReaderSettings& settings)
-    : FrameQueue(settings.queue_frames, !opened.live),
-      port_(std::move(opened.port)),
+    : port_(std::move(opened.port)),
       live_(opened.live),
       sensor_(sensor),
       silence_s_(settings.silence_s > 0 ? settings.silence_s : silence_s(sensor)),
       frames_(sensor, opened.stored),
-      last_frame_s_(port_->now()) {
+      last_frame_s_(port_->now()),
+      most_(settings.queue_frames) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -121,7 +121,50 @@ void SensorReader::run() {
   frames_.close();
   const std::lock_guard lock(mutex_);
   counters_ = frames_.counters();
-  end();
+  ended_ = true;
+  arrived_.notify_all();
+}
+
+bool SensorReader::asked_to_stop() {
+  const std::lock_guard lock(mutex_);
+  return stop_;
+}
+
+void SensorReader::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  taken_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+std::optional<ReadFrame> SensorReader::next(double wait_s) {
+  std::unique_lock lock(mutex_);
+  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return !queue_.empty() || ended_; });
+  if (!queue_.empty()) {
+    ReadFrame frame = std::move(queue_.front());
+    queue_.pop_front();
+    taken_.notify_one();
+    return frame;
+  }
+  if (error_) std::rethrow_exception(error_);
+  return std::nullopt;
+}
+
+void SensorReader::check() {
+  const std::lock_guard lock(mutex_);
+  if (error_) std::rethrow_exception(error_);
+}
+
+void SensorReader::wait_for_end(double wait_s) {
+  std::unique_lock lock(mutex_);
+  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return ended_; });
+}
+
+bool SensorReader::ended() const {
+  const std::lock_guard lock(mutex_);
+  return ended_ && queue_.empty() && !error_;
 }
 
 double SensorReader::silence_s(const Sensor& sensor) {
@@ -185,7 +228,14 @@ void SensorReader::take(std::span<const ReadFrame> frames) {
   for (const ReadFrame& frame : frames) {
     if (live_ && frame.arrival.stamp_s && !clock_checked_)
       check_clock(*frame.arrival.stamp_s, frame.arrival.time_s);
-    put(lock, frame);
+    if (!live_) {
+      taken_.wait(lock, [&] { return queue_.size() < most_ || stop_; });
+    } else if (queue_.size() >= most_) {
+      queue_.pop_front();
+      ++dropped_;
+    }
+    queue_.push_back(frame);
+    arrived_.notify_one();
   }
 }
 

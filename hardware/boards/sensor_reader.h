@@ -3,15 +3,20 @@
 // oldest frames; a counter says how many.
 #pragma once
 
+#include <condition_variable>
+#include <deque>
+#include <exception>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <span>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "data/clock/frame_clock.h"
 #include "data/frames/sensor_decoder.h"
 #include "data/sensors/rest_tracker.h"
-#include "hardware/boards/frame_queue.h"
 #include "hardware/ports/open_port.h"
 
 namespace supertac {
@@ -74,7 +79,7 @@ struct ReaderSettings {
 
 /// What ends it is PortUnplugged, BoardSilent or WrongDevice, the last also where a clock has another unit
 /// than the file says.
-class SensorReader : public FrameQueue<ReadFrame> {
+class SensorReader {
  public:
   /// How long a live sensor may say nothing (s).
   static double silence_s(const Sensor& sensor);
@@ -83,11 +88,26 @@ class SensorReader : public FrameQueue<ReadFrame> {
   SensorReader(OpenedPort opened, const Sensor& sensor, const ReaderSettings& settings = {});
   /// Stops reading; frames that already arrived at the port are still read.
   ~SensorReader() { stop(); }
+  SensorReader(const SensorReader&) = delete;
+  SensorReader& operator=(const SensorReader&) = delete;
+
+  /// Ends the thread; what it has read already can still be taken.
+  void stop();
+  /// The next frame, oldest first; empty after `wait_s` of wall time, or at the end. Rethrows what ended the
+  /// reader once the frames before it have been taken.
+  std::optional<ReadFrame> next(double wait_s);
+  /// Rethrows what ended the reader, without waiting and without taking frames.
+  void check();
+  /// Waits at most `wait_s` of wall time for the reader to end by itself.
+  void wait_for_end(double wait_s);
+  /// The source is at its end and all frames have been taken.
+  bool ended() const;
   bool live() const { return live_; }
   ReaderCounters counters();
 
  private:
   void run();
+  bool asked_to_stop();
   void take(std::span<const ReadFrame> frames);
   void check_silence(double time_s);
   void check_clock(double stamp_s, double arrival_s);
@@ -102,7 +122,16 @@ class SensorReader : public FrameQueue<ReadFrame> {
   double went_s_ = 0, first_arrival_s_ = 0, checked_time_s_ = 0, longest_step_s_ = 0;
   std::uint64_t checked_frames_ = 0;
   bool clock_checked_ = false;
+
+  mutable std::mutex mutex_;  // of all that follows
+  std::condition_variable arrived_, taken_;
+  std::deque<ReadFrame> queue_;
+  std::size_t most_;
+  bool stop_ = false, ended_ = false;
+  std::exception_ptr error_;
   ReaderCounters counters_;
+  std::uint64_t dropped_ = 0;
+  std::thread thread_;
 };
 
 }  // namespace supertac

@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <netdb.h>
 #include <poll.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -13,7 +14,6 @@
 #include <optional>
 
 #include "hardware/ports/errors.h"
-#include "hardware/ports/host_addresses.h"
 #include "hardware/ports/port_list.h"
 #include "hardware/ports/serial_port.h"
 #include "hardware/ports/serial_termios.h"
@@ -24,6 +24,7 @@ namespace supertac {
 namespace {
 
 constexpr int kSocketBytes = 4 << 20;
+constexpr int kPatienceS = 5;  // with a name server, and with a host that does not answer
 
 /// Bytes of a descriptor that are only read.
 class DescriptorPort : public Port {
@@ -94,6 +95,47 @@ OpenedPort open_serial(const std::string& address, const std::string& rest, doub
     fail(address, "expected serial:DEVICE@BAUD, such as serial:/dev/ttyACM0@115200");
   const SerialSettings settings{.baud = static_cast<unsigned>(*baud), .speedup = speedup};
   return {std::make_unique<SerialPort>(resolve_board_port(rest.substr(0, at)), settings)};
+}
+
+struct FreeAddresses {
+  void operator()(addrinfo* list) const { freeaddrinfo(list); }
+};
+using HostAddresses = std::unique_ptr<addrinfo, FreeAddresses>;
+
+// What a thread of the C library reads and writes while it asks.
+struct Question {
+  std::string host, service;
+  addrinfo wanted{};
+  gaicb entry{};
+};
+
+/// Of `host` (empty: of this computer, to listen at) and `port`, for sockets of `type`. getaddrinfo() alone
+/// may wait for name servers for minutes; here at most kPatienceS, and less when a signal comes.
+HostAddresses host_addresses(const std::string& what, const std::string& host, int port, int type) {
+  auto question = std::make_unique<Question>();
+  question->host = host, question->service = std::to_string(port);
+  question->wanted.ai_socktype = type;
+  question->wanted.ai_family = host.empty() ? AF_INET : AF_UNSPEC;
+  question->wanted.ai_flags = host.empty() ? AI_PASSIVE : 0;
+  gaicb& entry = question->entry;
+  entry.ar_name = host.empty() ? nullptr : question->host.c_str();
+  entry.ar_service = question->service.c_str(), entry.ar_request = &question->wanted;
+  gaicb* entries[] = {&entry};
+  int error = getaddrinfo_a(GAI_NOWAIT, entries, 1, nullptr);
+  if (error == 0) {
+    const timespec patience{kPatienceS, 0};
+    (void)gai_suspend(entries, 1, &patience);
+    error = gai_error(&entry);
+  }
+  if (error == EAI_INPROGRESS) {
+    // Who cannot be stopped goes on writing there.
+    if (gai_cancel(&entry) == EAI_NOTCANCELED) (void)question.release();
+    throw PortError(what +
+                    ": the name server does not answer; see whether the host is right, or give its number");
+  }
+  HostAddresses found(entry.ar_result);
+  if (error != 0) throw PortError(what + ": " + gai_strerror(error) + "; see whether the host is right");
+  return found;
 }
 
 /// Bound, or connected in time; nothing, and errno, when that fails or a signal comes.

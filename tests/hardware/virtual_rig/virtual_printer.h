@@ -15,7 +15,6 @@
 #include <utility>
 #include <vector>
 
-#include "hardware/virtual_rig/motion_queue.h"
 #include "hardware/virtual_rig/virtual_rig.h"
 #include "tests/hardware/virtual_rig/faults.h"
 
