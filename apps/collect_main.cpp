@@ -15,7 +15,7 @@
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "apps/web/web_options.h"
-#include "data/plates/plate_file.h"
+#include "data/plates/plate.h"
 #include "data/recordings/recording.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/ports/errors.h"

@@ -12,7 +12,7 @@
 #include "apps/common/running/signals.h"
 #include "apps/import/tables.h"
 #include "apps/import/text_folder.h"
-#include "data/plates/plate_file.h"
+#include "data/plates/plate.h"
 #include "data/recordings/imports/table_import.h"
 #include "io/files/safetensors.h"
 

@@ -8,7 +8,7 @@
 #include "apps/common/running/signals.h"
 #include "apps/stream/stream.h"
 #include "apps/web/web_options.h"
-#include "data/plates/plate_file.h"
+#include "data/plates/plate.h"
 #include "hardware/boards/listen.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "data/frames/probe.h"
-#include "data/sensors/frame_load.h"
+#include "data/sensors/sensor.h"
 #include "hardware/boards/listen.h"
 #include "hardware/boards/sensor_reader.h"
 #include "library/guard.h"

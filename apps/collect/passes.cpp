@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "apps/common/output/provenance.h"
-#include "data/plates/plate_file.h"
+#include "data/plates/plate.h"
 #include "data/recordings/recording.h"
 #include "hardware/ports/errors.h"
 #include "io/files/file.h"

@@ -11,10 +11,9 @@
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
-#include "data/plates/plate_file.h"
+#include "data/plates/plate.h"
 #include "data/recordings/imports/film_truth.h"
 #include "data/recordings/imports/table_import.h"
-#include "data/registration/apply_registration.h"
 #include "data/registration/registration.h"
 #include "io/numbers/numbers.h"
 

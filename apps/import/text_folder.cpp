@@ -11,10 +11,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "data/plates/plate_file.h"
-#include "data/registration/alignment.h"
-#include "data/registration/apply_registration.h"
-#include "data/registration/lost_frames.h"
+#include "data/plates/plate.h"
+#include "data/registration/pass_features.h"
+#include "data/registration/registration.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -170,11 +169,9 @@ void import_text_folder(const std::string& root, const FolderImport& settings,
 }
 
 std::string ImportedPass::summary() const {
-  const std::size_t dropped = lines.lines - lines.empty - lines.frames;
   std::string line = (unknown ? recording.plate : plate.name()) + "/" + std::to_string(recording.trial) +
                      "/" + std::to_string(recording.pass) + ".txt  " + std::to_string(lines.lines) +
-                     " lines, " + std::to_string(dropped) + " dropped (" + std::to_string(lines.malformed()) +
-                     " malformed), ";
+                     " lines, " + std::to_string(lines.dropped()) + " dropped, ";
   if (unknown) return line + "of unknown shape: no position, no truth";
   line += "residual " + format(registration.residual, 2) + " mm, ";
   if (registration.agreement > 0) line += "aligned by " + format(registration.shift_mm, 2) + " mm, ";
@@ -189,12 +186,7 @@ nlohmann::ordered_json ImportedPass::to_json() const {
           {"pass", recording.pass},
           {"lines", lines.lines},
           {"frames", lines.frames},
-          {"malformed", lines.malformed()},
-          {"too_few_columns", lines.too_few},
-          {"too_many_columns", lines.too_many},
-          {"not_numeric", lines.not_numeric},
-          {"non_finite", lines.non_finite},
-          {"out_of_range", lines.out_of_range},
+          {"dropped", lines.dropped()},
           {"registration",
            {{"start_mm", registration.start_mm},
             {"rate_mm_s", registration.rate},

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "data/sensors/frame_load.h"
+#include "data/sensors/sensor.h"
 #include "io/files/mcap_file.h"
 
 namespace supertac {

@@ -10,8 +10,8 @@
 #include <stdexcept>
 
 #include "apps/common/running/signals.h"
-#include "data/plates/plate_file.h"
-#include "data/recordings/signals_tensor.h"
+#include "data/plates/plate.h"
+#include "data/recordings/recording.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"

@@ -41,7 +41,6 @@
 #include <vector>
 
 #include "data/clock/clock_model.h"
-#include "data/clock/device_stamps.h"
 
 namespace supertac {
 

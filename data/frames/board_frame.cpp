@@ -5,8 +5,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "data/frames/frame_decoder.h"
-
 namespace supertac {
 
 std::array<float, rig::kTaxels> taxel_volts(const BoardFrame& frame) {

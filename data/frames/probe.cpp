@@ -10,7 +10,7 @@
 
 #include "data/frames/sensor_decoder.h"
 #include "data/sensors/layout.h"
-#include "data/sensors/touch_rests.h"
+#include "data/sensors/rest_tracker.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 

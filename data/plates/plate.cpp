@@ -9,6 +9,9 @@
 
 #include "data/plates/height_map.h"
 #include "data/plates/random_plate.h"
+#include "data/plates/stl.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
 #include "io/numbers/same_bits.h"
 #include "io/numbers/text.h"
 
@@ -27,6 +30,7 @@ struct TextureKind {
   double lowest = 0;   // trough, in heights
 };
 
+constexpr std::string_view kRandom = "random";  // and a number: a plate's name
 constexpr double kFinestMm = 0.05, kWidestMm = 1000;
 constexpr double kFitSlackMm = 1e-9;  // an element that fits exactly still fits after rounding
 
@@ -118,24 +122,7 @@ class Bands : public Surface {
   std::vector<Band> bands_;
 };
 
-std::string in_lower_case(std::string text) {
-  std::ranges::transform(text, text.begin(), lower);
-  return text;
-}
-
-// The name that differs by the case of letters only; empty when none does.
-std::string meant(const std::string& name) {
-  for (const RigPlate& plate : kRigPlates)
-    if (in_lower_case(plate.name) == in_lower_case(name)) return plate.name;
-  for (const TextureKind& kind : kKinds)
-    if (in_lower_case(name).starts_with(kind.word)) return in_lower_case(name);
-  return in_lower_case(name) == "plain" ? "plain" : "";
-}
-
 [[noreturn]] void refuse(const std::string& name, const std::string& why) {
-  const std::string other = meant(name);
-  if (!other.empty() && other != name)
-    throw std::invalid_argument("plate \"" + name + "\": names are case-sensitive, is " + other + " meant?");
   throw std::invalid_argument("plate \"" + name + "\": " + why +
                               "; expected a rig plate such as 3_Bumps, or plain, or " +
                               joined(kKinds, "|", &TextureKind::word) +
@@ -184,14 +171,17 @@ std::string generic_name(const std::string& name) {
 }  // namespace
 
 bool Plate::is_file(const std::string& name) {
-  return name.size() > 4 && in_lower_case(name.substr(name.size() - 4)) == ".stl";
+  return name.size() > 4 &&
+         std::ranges::equal(name.substr(name.size() - 4), std::string_view(".stl"), {}, lower);
 }
 
 Plate Plate::named(const std::string& name) {
   if (is_file(name))
     return {std::filesystem::path(name).filename().string(),
             std::make_shared<const HeightMap>(read_stl(name), rig::kPlateWidthMm, rig::kPlateLengthMm, name)};
-  if (const auto number = random_plate_number(name)) return random_plate(*number);
+  if (name.starts_with(kRandom))
+    if (const auto number = parse_uint(name.substr(kRandom.size())); number && *number <= UINT32_MAX)
+      return random_plate(static_cast<std::uint32_t>(*number));
   const std::string generic = generic_name(name);
   std::vector<Texture> textures;
   for (std::size_t begin = 0; begin <= generic.size();) {
@@ -239,6 +229,46 @@ const std::vector<std::string>& default_plates() {
   static const std::vector<std::string> kNames = {"bumps12",  "bumps6",  "bumps4",
                                                   "ridges12", "ridges6", "ridges4"};
   return kNames;
+}
+
+Plate random_plate(std::uint32_t number) {
+  const std::string name = std::string(kRandom) + std::to_string(number);
+  const DrawnPlate drawn = draw_plate(number);
+  return drawn.surface ? Plate(name, drawn.surface) : Plate(name, drawn.textures);
+}
+
+bool resemble(const Plate& a, const Plate& b) {
+  constexpr double kSamePitchMm = 0.5;
+  for (const Texture& t : a.textures())
+    for (const Texture& u : b.textures())
+      if (t.kind == u.kind && std::abs(t.pitch_mm - u.pitch_mm) < kSamePitchMm) return true;
+  return false;
+}
+
+bool is_unknown_plate(const std::string& name) { return name.starts_with("unknown"); }
+
+Plate plate_in_folder(const std::string& name, const std::string& folder) {
+  if (is_unknown_plate(name))
+    throw std::invalid_argument(
+        "these signals have no truth to train on or score. Learn from simulated presses (supertac-simulate "
+        "--sensor FILE --presses N), film what presses (supertac-import --truth), or slide over a plate that "
+        "is known (supertac-import --plate NAME)");
+  if (!Plate::is_file(name)) return Plate::named(name);
+  if (name.find('/') != std::string::npos)
+    throw std::invalid_argument("plate " + in_quotes(name) +
+                                ": expected the name of an STL file beside the recordings, found a path");
+  return Plate::named((std::filesystem::path(folder) / name).string());
+}
+
+void keep_plate_file(const std::string& path, const std::string& folder) {
+  if (!Plate::is_file(path)) return;
+  const auto bytes = read_file(path, kMaxStlBytes);
+  const std::string copy = (std::filesystem::path(folder) / std::filesystem::path(path).filename()).string();
+  if (std::filesystem::exists(copy)) {
+    if (read_file(copy, kMaxStlBytes) == bytes) return;
+    throw FileError(copy, "is another plate than " + path + "; rename one of them or choose another folder");
+  }
+  write_file(copy, bytes);
 }
 
 }  // namespace supertac

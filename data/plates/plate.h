@@ -1,23 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "data/plates/surface.h"
-#include "data/sensors/rig.h"
 
 namespace supertac {
-
-/// One texture of a plate: equal elements, pitch_mm apart, 0 between them. Ridges are triangular, 2.5 mm wide
-/// at most; bumps half cylinders, blobs half spheres, twice as wide as high; waves a cosine.
-struct Texture {
-  std::string kind = "plain";  ///< or ridges, bumps, waves (lines along x) or blobs
-  double pitch_mm = 0;         ///< distance between neighbouring centres
-  double height_mm = 0;        ///< of the highest point above the plate's base
-  /// The texture is laid out in [from, to], centred, as many elements as fit whole.
-  double from_mm = rig::kTextureFromMm, to_mm = rig::kTextureToMm;
-};
 
 /// The surface the finger slides over: rig::kPlateWidthMm (x) by kPlateLengthMm (y), with its texture in the
 /// middle third. Coordinates are the plate's own, origin at its corner; z = 0 is its flat part.
@@ -73,5 +63,30 @@ class Plate {
 /// and ridges at 12, 6 and 4 mm).
 std::vector<std::string> rig_plates();
 const std::vector<std::string>& default_plates();
+
+/// The plate called "random<number>": what networks for unseen plates are trained and tested on
+/// (data/plates/random_plate.h says how it is drawn).
+Plate random_plate(std::uint32_t number);
+
+/// True when both have a texture of the same kind whose pitches differ by less than half a millimetre: a
+/// network that is trained on one has seen the other.
+bool resemble(const Plate& a, const Plate& b);
+
+// Plates that come from a file. A recording names its plate; when that is an STL file, the file lies beside
+// the recording, so that a folder of recordings holds all that training needs and can be moved.
+
+/// True for the name of a plate of unknown shape: it begins with "unknown". Its recordings can be streamed
+/// and drawn; they have no truth, so nothing can be learnt from them or scored.
+bool is_unknown_plate(const std::string& name);
+
+/// The plate that `name` means for recordings of `folder`: one of Plate::named, or an STL file there.
+/// Throws std::invalid_argument for an unknown plate, or an STL file named with a folder (a recording must
+/// not choose which file is read); FileError when the file is missing or no plate.
+Plate plate_in_folder(const std::string& name, const std::string& folder);
+
+/// Puts the STL file `path` into `folder` under its own name, so that plate_in_folder() finds it. Does
+/// nothing for a plate that is no file, or when the same bytes are there already.
+/// Throws FileError when another plate has that name there.
+void keep_plate_file(const std::string& path, const std::string& folder);
 
 }  // namespace supertac

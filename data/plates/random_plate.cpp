@@ -2,19 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
-#include <vector>
 
-#include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
 #include "io/numbers/same_bits.h"
 
 namespace supertac {
 namespace {
 
-constexpr std::string_view kWord = "random";
 constexpr double kLeastPitchMm = 4, kMostPitchMm = 15, kLeastHeightMm = 0.5, kMostHeightMm = 3;
-constexpr double kSamePitchMm = 0.5;
 
 /// Random numbers one after the other.
 class Draw {
@@ -129,43 +124,28 @@ std::vector<Element> draw_scattered(Draw& draw, double from_mm, double to_mm) {
   return elements;
 }
 
-Plate made_of(const std::string& name, std::vector<Element> elements) {
-  return {name, std::make_shared<const Elements>(std::move(elements))};
+DrawnPlate made_of(std::vector<Element> elements) {
+  return {{}, std::make_shared<const Elements>(std::move(elements))};
 }
 
 }  // namespace
 
-Plate random_plate(std::uint32_t number) {
+DrawnPlate draw_plate(std::uint32_t number) {
   Draw draw(number);
-  const std::string name = std::string(kWord) + std::to_string(number);
   const double from = draw.between(30, 40), to = draw.between(60, 78), layout = draw.between(-1, 16);
-  if (layout < 1) return {name, std::vector<Texture>{}};
-  if (layout < 8) return {name, {draw_texture(draw, from, to)}};
+  if (layout < 1) return {};
+  if (layout < 8) return {{draw_texture(draw, from, to)}};
   if (layout < 9.5) {
     const double middle = (from + to) / 2;
-    return {name, {draw_texture(draw, from, middle), draw_texture(draw, middle, to)}};
+    return {{draw_texture(draw, from, middle), draw_texture(draw, middle, to)}};
   }
-  if (layout < 13.5) return made_of(name, draw_lines(draw, from, to));
+  if (layout < 13.5) return made_of(draw_lines(draw, from, to));
   if (layout < 14.5) {
     Element e = draw_element(draw, true);
     e.x_mm = rig::kPlateWidthMm / 2, e.y_mm = draw.between(from, to);
-    return made_of(name, {e});
+    return made_of({e});
   }
-  return made_of(name, draw_scattered(draw, from, to));
-}
-
-std::optional<std::uint32_t> random_plate_number(std::string_view name) {
-  if (!name.starts_with(kWord)) return std::nullopt;
-  const auto number = parse_uint(std::string(name.substr(kWord.size())));
-  if (!number || *number > UINT32_MAX) return std::nullopt;
-  return static_cast<std::uint32_t>(*number);
-}
-
-bool resemble(const Plate& a, const Plate& b) {
-  for (const Texture& t : a.textures())
-    for (const Texture& u : b.textures())
-      if (t.kind == u.kind && std::abs(t.pitch_mm - u.pitch_mm) < kSamePitchMm) return true;
-  return false;
+  return made_of(draw_scattered(draw, from, to));
 }
 
 }  // namespace supertac

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <string>
 #include <vector>
+
+#include "data/sensors/rig.h"
 
 namespace supertac {
 
@@ -22,6 +25,16 @@ class Surface {
 
  protected:
   PlateExtent extent_;
+};
+
+/// One texture of a plate: equal elements, pitch_mm apart, 0 between them. Ridges are triangular, 2.5 mm wide
+/// at most; bumps half cylinders, blobs half spheres, twice as wide as high; waves a cosine.
+struct Texture {
+  std::string kind = "plain";  ///< or ridges, bumps, waves (lines along x) or blobs
+  double pitch_mm = 0;         ///< distance between neighbouring centres
+  double height_mm = 0;        ///< of the highest point above the plate's base
+  /// The texture is laid out in [from, to], centred, as many elements as fit whole.
+  double from_mm = rig::kTextureFromMm, to_mm = rig::kTextureToMm;
 };
 
 }  // namespace supertac

@@ -9,7 +9,7 @@
 #include <span>
 #include <stdexcept>
 
-#include "data/recordings/signals_tensor.h"
+#include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/files/provenance.h"

@@ -75,6 +75,16 @@ TaxelArray array_of(const SafetensorsFile& file);
 SignalScale signal_scale_of(const SafetensorsFile& file);
 std::map<std::string, std::string> metadata_of(const TaxelArray& array, const SignalScale& scale);
 
+/// The tensor that holds the signals of a recording or a log of pictures: "volts" where they are volts,
+/// "signals" of any other unit; until 0.2 "volts" of all, and read so for ever.
+inline const char* signals_tensor(const SignalScale& scale) {
+  return scale.unit == "V" ? "volts" : "signals";
+}
+/// Which of the two a file has.
+inline const char* signals_tensor(const SafetensorsFile& file) {
+  return file.tensors().contains("signals") ? "signals" : "volts";
+}
+
 /// "<plate>_t<trial>_p<pass>_v<speed>.safetensors", the name a recording has in a folder of recordings.
 std::string recording_file_name(const Recording& recording);
 

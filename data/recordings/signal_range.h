@@ -1,4 +1,4 @@
-// In what range a sensor's signals lie.
+// In what range a sensor's signals lie, and which of its taxels feel anything.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "data/recordings/felt_taxels.h"
 #include "data/recordings/resample.h"
 
 namespace supertac {
@@ -21,6 +20,27 @@ using ReadingWatch = std::function<void(std::size_t done, std::size_t all)>;
 /// beyond the range by a quarter of it, or they are shares of 0 to 1 under a range at least ten times as
 /// wide. Imports and training ask it, and the Python package does the same (python/supertac/recordings.py).
 std::string contradiction(std::span<const float> signals, const SignalScale& scale);
+
+/// Gathers over recordings how far each taxel's signals go. A simulation whose body does not fit its scenes
+/// leaves taxels with noise and drift alone, which stay within a tenth of the range.
+class FeltTaxels {
+ public:
+  void add(const Recording& recording);
+  /// Of the simulated recordings, all of one array: those whose signals stay within a tenth of the range.
+  /// None while nothing simulated was added.
+  std::vector<int> unfelt() const;
+  /// "49 of 60 taxels feel nothing: 0-9, 12; ..." and what helps, where that holds of more than three
+  /// quarters: of a dome that slides over one strip of a plate half of the taxels feel it. Else nothing.
+  std::string complaint() const;
+  /// Throws std::runtime_error with the complaint where there is one.
+  void check() const;
+
+ private:
+  TaxelArray array_;
+  double span_ = 0;
+  bool flat_ = true;
+  std::vector<float> low_, high_;  // of each signal
+};
 
 /// The signals of some recordings, an even sample of each: 16 frames or more, of long ones a frame in 64, and
 /// of more than 16 million frames fewer.

@@ -1,5 +1,4 @@
-#include "data/registration/alignment.h"
-
+// Passes of one plate onto each other.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,6 +6,7 @@
 #include <vector>
 
 #include "data/recordings/resample.h"
+#include "data/registration/registration.h"
 #include "io/numbers/median.h"
 #include "io/numbers/parallel.h"
 

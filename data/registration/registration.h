@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "data/plates/plate.h"
@@ -58,5 +59,43 @@ Registration register_pass(const Recording& recording, const Plate& plate);
 /// clock is right to 5 %. Frames lost over more than the texture's length; a moving average over more than
 /// half the least distance of two elements.
 void judge(Registration& registration, const Recording& recording, const Plate& plate);
+
+/// Writes what a registration says into its recording.
+/// position_mm: x as given, y from the registration, limited to the plate; NaN outside
+/// valid_from_s..valid_until_s. time_s: from lost_at_s on later by lost_s. The gap is filled with frames on a
+/// straight line between the signals before and behind it, position unknown; where either side has nothing,
+/// or a frame at most would fit, it is left open. Stamps that were only nominal (metadata time_base) are then
+/// stretched so that the finger of a reliable pass moves at its commanded speed (10 mm/s where that is
+/// unknown); time_base becomes "registered". Metadata registration_start_mm, _rate, _residual_mm, _reliable
+/// (yes, no), _reason, _shift_mm, _stretch_mm and _lost_s.
+void apply(const Registration& registration, Recording& recording, double x_mm = rig::kPlateWidthMm / 2);
+
+/// A pass and where its own registration puts it.
+struct RegisteredPass {
+  const Recording* recording = nullptr;
+  Registration* registration = nullptr;
+};
+
+/// Aligns the passes of one plate with each other. A registration knows its pass by a few dozen contacts; the
+/// whole course of the signals, beside that of the other passes over the same texture, tells its place
+/// better.
+///
+/// Each pass is a profile p_r(y): how far the four taxels of row r are pressed on average within 1 mm of y,
+/// for y = 22..92 mm. Its line is changed by a shift a and a stretch b (mm),
+///   y' = y + a + b (y - 54) / 26,
+/// for the largest
+///   mean over r of corr(p_r, mean of the other passes' p_r) - 0.002 ((a / 0.5)^2 + b^2),
+/// six rounds over all passes. The medians of a and b over the passes are subtracted in each round, so that
+/// the plate as a whole stays where the registrations put it.
+///
+/// A pass that agrees badly (correlation below 0.9) is tried with frames lost at one place: 0.1 to 0.8 s, at
+/// every 0.2 s. Where the signals stand still such a loss leaves no step for find_lost_frames() to see. It is
+/// accepted when the correlation rises by 0.05, and all passes are aligned once more.
+///
+/// Passes that are not reliable take no part; with fewer than three nothing changes, nor does a pass whose
+/// correlation stays below a half. Sets start_mm, rate, shift_mm, stretch_mm, lost_at_s, lost_s and agreement
+/// (the correlation). It uses no truth, split or network. Throws std::invalid_argument when a recording is
+/// not of the rig's array.
+void align_passes(std::span<const RegisteredPass> passes);
 
 }  // namespace supertac

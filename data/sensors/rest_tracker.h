@@ -1,4 +1,4 @@
-// Where a sensor's signals rest while that changes.
+// Where a sensor's signals rest: told from frames in which somebody pressed, and followed while that changes.
 #pragma once
 
 #include <span>
@@ -33,5 +33,13 @@ class RestTracker {
   double time_constant_s_, before_s_, free_s_ = 0, band_, fastest_ = 0;
   std::vector<double> mean_, rate_, rest_;
 };
+
+/// The rest of each signal, from signals [signal][frame] of an array that is touched here and there. A
+/// frame's total is the sum of its signals in the pressed direction (of several channels a taxel: of their
+/// distances from the medians). Nothing touches where the total is within four standard deviations, of its
+/// own noise, of the level that a tenth of all frames stay below; a rest is the median over these frames. So
+/// each taxel may be pressed for most of the time, if the array is let go for a tenth of it.
+std::vector<double> rests_between_touches(std::span<const std::vector<float>> signals, int channels,
+                                          bool rises);
 
 }  // namespace supertac

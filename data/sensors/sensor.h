@@ -3,6 +3,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -132,6 +133,18 @@ nlohmann::ordered_json json_of(const Pitch& pitch);
 /// That of the key pitch_mm. This and scale_of() throw FileError as sensor_of_json().
 Pitch pitch_of(JsonObject& keys, std::optional<Pitch> fallback = {});
 SignalScale scale_of(JsonObject keys);
+
+/// What a whole frame says of a touch.
+struct FrameLoad {
+  /// Sum over the taxels of share = (rest - signal) / span, 1 for a taxel at the end of its range; of several
+  /// channels sqrt(sum of share^2), which has no sign. A force in no unit: how hard a share presses differs
+  /// from array to array, and a taxel at its end hides what is beyond.
+  double total_force = 0;
+  std::size_t saturated = 0;  ///< signals with |share| >= 1
+};
+
+/// Of a frame [taxels][channels], in the unit of `scale`.
+FrameLoad load_of(std::span<const float> signals, int channels, const SignalScale& scale);
 
 /// A frame's header or trailer as a file states it: two hexadecimal digits for each byte.
 std::string hex_of_bytes(const std::string& bytes);

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "data/sensors/touch_rests.h"
+#include "data/sensors/rest_tracker.h"
 #include "data/simulation/presses.h"
 #include "io/files/json.h"
 #include "io/numbers/median.h"

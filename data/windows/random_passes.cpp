@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/plates/random_plate.h"
+#include "data/plates/plate.h"
 #include "data/simulation/simulator.h"
 #include "io/numbers/parallel.h"
 #include "io/numbers/random.h"

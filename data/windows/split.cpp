@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "data/plates/random_plate.h"
+#include "data/plates/plate.h"
 #include "data/windows/batching.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/text.h"

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "data/plates/height_map.h"
-#include "data/plates/plate_file.h"
+#include "data/plates/plate.h"
 #include "data/plates/truth.h"
 #include "data/windows/contact_level.h"
 #include "data/windows/transforms/normalise_window.h"

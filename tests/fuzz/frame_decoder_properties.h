@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "data/frames/frame_decoder.h"
+#include "data/frames/board_frame.h"
 
 namespace supertac {
 

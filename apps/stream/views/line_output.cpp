@@ -11,7 +11,7 @@
 #include <stdexcept>
 
 #include "apps/common/running/signals.h"
-#include "data/recordings/signals_tensor.h"
+#include "data/recordings/recording.h"
 #include "hardware/ports/serial_port.h"
 #include "io/numbers/numbers.h"
 

@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "apps/stream/live_frame.h"
-#include "data/sensors/frame_load.h"
+#include "data/sensors/sensor.h"
 
 namespace supertac {
 

@@ -1,13 +1,234 @@
 #include "data/recordings/imports/film_truth.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
+#include <vector>
 
-#include "data/recordings/imports/table_import.h"
 #include "io/files/file.h"
+#include "io/numbers/median.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
+namespace {
+
+constexpr double kCoarseS = 0.05, kFineS = 0.01;
+
+// A course on even steps from its first time on, scaled to 0 to 1.
+struct Even {
+  double first_s = 0, step_s = 0;
+  std::vector<double> load;
+
+  Even(const LoadCourse& course, double step) : first_s(course.time_s.front()), step_s(step) {
+    std::vector<double> sorted(course.load.begin(), course.load.end());
+    const double low = quantile(sorted, 0.02), high = quantile(sorted, 0.98);
+    std::size_t next = 0;
+    // Of frames closer than a step the mean, else a line between those around.
+    for (double t = first_s; t <= course.time_s.back(); t += step) {
+      double sum = 0, count = 0;
+      for (std::size_t i = next; i < course.time_s.size() && course.time_s[i] < t + step / 2; ++i)
+        if (course.time_s[i] >= t - step / 2) sum += course.load[i], ++count;
+      while (next + 1 < course.time_s.size() && course.time_s[next + 1] <= t) ++next;
+      double value = course.load[next];
+      if (count > 1) {
+        value = sum / count;
+      } else if (next + 1 < course.time_s.size()) {
+        const double share = (t - course.time_s[next]) / (course.time_s[next + 1] - course.time_s[next]);
+        value = std::lerp(course.load[next], course.load[next + 1], std::clamp(share, 0.0, 1.0));
+      }
+      load.push_back(high > low ? std::clamp((value - low) / (high - low), 0.0, 1.0) : 0);
+    }
+  }
+  // Means over `width` steps around each, twice: the slope of noise is no slope. What is done to both courses
+  // moves neither.
+  void smooth(std::size_t width) {
+    for (int twice = 0; twice < 2; ++twice) {
+      std::vector<double> sums(load.size() + 1);
+      for (std::size_t i = 0; i < load.size(); ++i) sums[i + 1] = sums[i] + load[i];
+      for (std::size_t i = 0; i < load.size(); ++i) {
+        const std::size_t half = std::min({width / 2, i, load.size() - 1 - i});
+        load[i] = (sums[i + half + 1] - sums[i - half]) / static_cast<double>(2 * half + 1);
+      }
+    }
+  }
+  double time(std::size_t i) const { return first_s + step_s * static_cast<double>(i); }
+  bool holds(double t) const { return t >= first_s + step_s && t <= time(load.size() - 1) - 2 * step_s; }
+  double at(double t) const {
+    const double place = (t - first_s) / step_s;
+    const auto i = std::min(load.size() - 2, static_cast<std::size_t>(std::max(0.0, place)));
+    return std::lerp(load[i], load[i + 1], place - static_cast<double>(i));
+  }
+  double slope(double t) const { return (at(t + step_s) - at(t - step_s)) / (2 * step_s); }
+};
+
+struct Sums {
+  double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+  void add(double x, double y) { n += 1, a += x, b += y, aa += x * x, bb += y * y, ab += x * y; }
+  double correlation() const {
+    const double va = aa - a * a / n, vb = bb - b * b / n;
+    return n > 2 && va > 1e-9 && vb > 1e-9 ? (ab - a * b / n) / std::sqrt(va * vb) : 0;
+  }
+};
+
+struct Place {
+  double offset_s, rate, correlation;
+};
+
+// Every offset and rate, about the film's middle.
+std::vector<Place> tried(const Even& sensor, const Even& film, double around_s, double middle_s) {
+  std::vector<Place> places;
+  const double half_s = film.step_s * static_cast<double>(film.load.size()) / 2;
+  const double rate_step = std::min(kMostRate, 1.5 * kCoarseS / half_s);
+  for (double rate = 1 - kMostRate; rate <= 1 + kMostRate + rate_step / 2; rate += rate_step)
+    for (double shift = -kFarthestS; shift <= kFarthestS; shift += kCoarseS) {
+      Sums sums;
+      for (std::size_t i = 0; i < film.load.size(); ++i) {
+        const double t = middle_s + around_s + shift + rate * (film.time(i) - middle_s);
+        if (sensor.holds(t)) sums.add(sensor.at(t), film.load[i]);
+      }
+      if (sums.n * film.step_s >= kFarthestS &&
+          2 * sums.n >= static_cast<double>(std::min(film.load.size(), sensor.load.size())))
+        places.push_back({around_s + shift, rate, sums.correlation()});
+    }
+  return places;
+}
+
+std::size_t touches_in(const Even& course) {
+  std::size_t count = 0;
+  bool up = false;
+  for (const double load : course.load) {
+    if (!up && load > 0.5) up = true, ++count;
+    if (up && load < 0.25) up = false;
+  }
+  return count;
+}
+
+// The shift and rate about the middle, and their deviations.
+struct Refined {
+  double shift_s, rate, shift_deviation_s, rate_deviation, correlation;
+};
+
+// Least squares of film = rest + gain sensor(t) + bent sensor(t)^2, t = middle + shift + rate (film's time -
+// middle).
+enum Unknown { kShift, kRate, kGain, kBent, kRest, kUnknowns };
+using Vector = std::array<double, kUnknowns>;
+using Matrix = std::array<Vector, kUnknowns>;
+
+// x of a x = y, a symmetric and positive definite (Gauss-Jordan).
+Vector solved(Matrix a, Vector y) {
+  for (std::size_t k = 0; k < kUnknowns; ++k) {
+    const double pivot = 1 / (a[k][k] + 1e-9);
+    for (double& v : a[k]) v *= pivot;
+    y[k] *= pivot;
+    for (std::size_t i = 0; i < kUnknowns; ++i) {
+      if (i == k) continue;
+      const double factor = a[i][k];
+      for (std::size_t j = k; j < kUnknowns; ++j) a[i][j] -= factor * a[k][j];
+      y[i] -= factor * y[k];
+    }
+  }
+  return y;
+}
+
+Refined refine(const Even& sensor, const Even& film, double middle_s, const Place& from) {
+  Vector unknown = {from.offset_s, from.rate, 1, 0, 0};
+  Matrix normal;
+  struct Second {  // sums of weight residual jacobian, and of weight jacobian jacobian
+    Vector score{};
+    Matrix normal{};
+  };
+  std::vector<Second> seconds;
+  std::vector<double> sizes;
+  Sums sums;
+  double deviation = 1;
+  for (int round = 0; round < 12; ++round) {
+    normal = {};
+    Vector right{};
+    seconds.assign(static_cast<std::size_t>(film.step_s * static_cast<double>(film.load.size())) + 1, {});
+    sizes.clear(), sums = {};
+    for (std::size_t i = 0; i < film.load.size(); ++i) {
+      const double away = film.time(i) - middle_s, t = middle_s + unknown[kShift] + unknown[kRate] * away;
+      if (!sensor.holds(t)) continue;
+      const double load = sensor.at(t),
+                   shown = unknown[kRest] + load * (unknown[kGain] + load * unknown[kBent]);
+      const double residual = film.load[i] - shown;
+      const double slope = (unknown[kGain] + 2 * load * unknown[kBent]) * sensor.slope(t);
+      const Vector jacobian = {slope, slope * away, load, load * load, 1};
+      const double weight = std::min(1.0, 3 * deviation / std::max(1e-12, std::abs(residual)));
+      Second& second = seconds[static_cast<std::size_t>(film.time(i) - film.first_s)];
+      for (std::size_t a = 0; a < kUnknowns; ++a) {
+        second.score[a] += weight * jacobian[a] * residual, right[a] += weight * jacobian[a] * residual;
+        for (std::size_t b = 0; b < kUnknowns; ++b) {
+          second.normal[a][b] += weight * jacobian[a] * jacobian[b];
+          normal[a][b] += weight * jacobian[a] * jacobian[b];
+        }
+      }
+      sizes.push_back(std::abs(residual));
+      sums.add(shown, film.load[i]);
+    }
+    const Vector step = solved(normal, right);
+    for (std::size_t a = 0; a < kUnknowns; ++a) unknown[a] += step[a];
+    if (!sizes.empty()) deviation = std::max(1e-6, normal_deviation(sizes));
+  }
+  // Jackknife: how far each second moves what the others say. Of a short film each of few touches has weight.
+  double of_shift = 0, of_rate = 0;
+  for (const Second& second : seconds) {
+    Matrix others = normal;
+    for (std::size_t a = 0; a < kUnknowns; ++a)
+      for (std::size_t b = 0; b < kUnknowns; ++b) others[a][b] -= second.normal[a][b];
+    const Vector moved = solved(others, second.score);
+    of_shift += moved[kShift] * moved[kShift], of_rate += moved[kRate] * moved[kRate];
+  }
+  return {unknown[kShift], unknown[kRate], std::sqrt(of_shift), std::sqrt(of_rate), sums.correlation()};
+}
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw std::runtime_error(
+      "sensor and film do not agree on when something touched: " + why +
+      "; record both while something presses and lets go several times, at uneven intervals");
+}
+
+}  // namespace
+
+std::string FilmClock::text() const {
+  return "offset " + format(offset_s, 3) + " +- " + format(offset_deviation_s, 3) + " s, rate " +
+         format(rate, 5) + " +- " + format(rate_deviation, 5) + ", correlation " + format(correlation, 3);
+}
+
+FilmClock find_film_clock(const LoadCourse& sensor, const LoadCourse& film) {
+  for (const LoadCourse* course : {&sensor, &film})
+    if (course->time_s.size() < 10 || course->time_s.back() - course->time_s.front() < kFarthestS)
+      refuse("fewer than " + format(kFarthestS) + " s were recorded");
+  const Even coarse_sensor(sensor, kCoarseS), coarse_film(film, kCoarseS);
+  if (touches_in(coarse_sensor) < 3 || touches_in(coarse_film) < 3) refuse("fewer than three touches");
+  const double middle = (film.time_s.front() + film.time_s.back()) / 2;
+  const bool overlap =
+      sensor.time_s.front() < film.time_s.back() && film.time_s.front() < sensor.time_s.back();
+  const double around = overlap ? 0 : sensor.time_s.front() - film.time_s.front();
+  const std::vector<Place> places = tried(coarse_sensor, coarse_film, around, middle);
+  if (places.empty()) refuse("they have fewer than " + format(kFarthestS) + " s in common");
+  const Place best = *std::ranges::max_element(places, {}, &Place::correlation);
+  for (const Place& other : places)
+    if (std::abs(other.offset_s - best.offset_s) > 0.4 && other.correlation > 0.93 * best.correlation)
+      refuse("offsets of " + format(best.offset_s, 2) + " and " + format(other.offset_s, 2) + " s fit alike");
+  Even fine_sensor(sensor, kFineS), fine_film(film, kFineS);
+  fine_sensor.smooth(11), fine_film.smooth(11);
+  const Refined fine = refine(fine_sensor, fine_film, middle, best);
+  if (!(fine.correlation >= 0.8))
+    refuse("their total loads have a correlation of " + format(fine.correlation, 2) +
+           ", expected 0.8 or more");
+  if (!(fine.shift_deviation_s <= 0.004 && fine.rate_deviation <= 4e-4))
+    refuse("the offset stays uncertain by " + format(fine.shift_deviation_s, 3) + " s, the rate by " +
+           format(100 * fine.rate_deviation, 3) + " %");
+  if (std::abs(fine.rate - 1) > kMostRate) refuse("a rate of " + format(fine.rate, 4));
+  return {.offset_s = middle + fine.shift_s - fine.rate * middle,
+          .rate = fine.rate,
+          .offset_deviation_s = fine.shift_deviation_s,
+          .rate_deviation = fine.rate_deviation,
+          .correlation = fine.correlation};
+}
+
 namespace {
 
 std::vector<double> loads_of(const Recording& recording) {

@@ -144,10 +144,10 @@ TEST_F(Output, JsonIsWrittenAtomicallyAndNotOverAnother) {
 TEST_F(Import, ReportsEveryFile) {
   write_pass(path("text/3_Bumps/1/1.txt"), rest_lines(900) + "1 2 3\n" + rest_lines(900));
   const ProcessResult result = succeed("supertac-import text --out out --json j");
-  EXPECT_TRUE(contains(result.out, "3_Bumps/1/1.txt  1801 lines, 1 dropped (1 malformed)"));
+  EXPECT_TRUE(contains(result.out, "3_Bumps/1/1.txt  1801 lines, 1 dropped, "));
   EXPECT_TRUE(contains(result.out, "not reliable"));  // it touches nothing
   const auto report = nlohmann::json::parse(bytes("j"));
-  EXPECT_EQ(report["files"][0]["too_few_columns"], 1);
+  EXPECT_EQ(report["files"][0]["dropped"], 1);
   const auto recording = read_recording(path("out/3_Bumps_t1_p1_v10.safetensors"));
   EXPECT_EQ(recording.frames(), 1800u);
   EXPECT_EQ(recording.metadata.at("registration_reliable"), "no");

@@ -5,7 +5,7 @@
 #include <iostream>
 #include <vector>
 
-#include "data/frames/frame_decoder.h"
+#include "data/frames/board_frame.h"
 #include "data/plates/plate.h"
 #include "data/plates/plate_mesh.h"
 #include "data/plates/stl.h"

@@ -14,7 +14,6 @@
 #include <thread>
 
 #include "data/recordings/recording.h"
-#include "data/recordings/signals_tensor.h"
 #include "data/simulation/simulator.h"
 #include "io/files/file.h"
 #include "io/files/json.h"

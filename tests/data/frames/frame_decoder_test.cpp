@@ -1,4 +1,4 @@
-#include "data/frames/frame_decoder.h"
+#include "data/frames/board_frame.h"
 
 #include "tests/hardware/rig_support.h"
 #include "tests/support/test.h"

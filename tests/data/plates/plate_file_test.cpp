@@ -1,4 +1,4 @@
-#include "data/plates/plate_file.h"
+#include "data/plates/plate.h"
 
 #include "data/plates/plate_mesh.h"
 #include "data/windows/windows.h"

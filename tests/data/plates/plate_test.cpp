@@ -78,13 +78,6 @@ TEST(Plate, MixedPlatesShareTheLength) {
   EXPECT_GT(plate.texture_end(), 66);
 }
 
-TEST(Plate, ANameInOtherLettersIsHintedAt) {
-  for (const auto& [name, meant] :
-       {std::pair{"Plain", "plain"}, {"3_bumps", "3_Bumps"}, {"Ridges6", "ridges6"}})
-    EXPECT_EQ(what_of<std::invalid_argument>([&] { Plate::named(name); }),
-              std::string("plate \"") + name + "\": names are case-sensitive, is " + meant + " meant?");
-}
-
 TEST(Plate, RefusesNamesItCannotRead) {
   const std::pair<const char*, const char*> cases[] = {
       {"", "unknown texture \"\""},

@@ -1,6 +1,6 @@
-#include "data/registration/alignment.h"
+#include "data/registration/registration.h"
 
-#include "data/registration/lost_frames.h"
+#include "data/registration/pass_features.h"
 #include "tests/data/registration/lossy_pass.h"
 #include "tests/support/test.h"
 

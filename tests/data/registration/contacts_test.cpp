@@ -1,4 +1,4 @@
-#include "data/registration/contacts.h"
+#include "data/registration/pass_features.h"
 
 #include "tests/support/test.h"
 

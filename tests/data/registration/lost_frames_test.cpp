@@ -1,4 +1,4 @@
-#include "data/registration/lost_frames.h"
+#include "data/registration/pass_features.h"
 
 #include "tests/data/registration/lossy_pass.h"
 #include "tests/support/test.h"

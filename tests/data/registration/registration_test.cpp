@@ -1,8 +1,8 @@
 #include "data/registration/registration.h"
 
 #include "data/recordings/imports/text_import.h"
-#include "data/registration/apply_registration.h"
-#include "data/registration/lost_frames.h"
+#include "data/registration/pass_features.h"
+#include "data/registration/registration.h"
 #include "tests/data/registration/lossy_pass.h"
 #include "tests/support/test.h"
 

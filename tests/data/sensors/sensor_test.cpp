@@ -1,5 +1,4 @@
 #include "data/sensors/sensor.h"
-#include "data/sensors/frame_load.h"
 
 #include <nlohmann/json.hpp>
 #include <random>

@@ -1,4 +1,4 @@
-#include "hardware/printers/line_port.h"
+#include "hardware/printers/marlin_link.h"
 
 #include "tests/support/test.h"
 

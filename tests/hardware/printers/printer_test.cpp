@@ -1,6 +1,6 @@
 #include "hardware/printers/printer.h"
 
-#include "hardware/printers/limits.h"
+#include "hardware/printers/printer.h"
 #include "tests/hardware/rig_support.h"
 #include "tests/support/test.h"
 

@@ -59,7 +59,7 @@ TEST(TextImport, TakesTabsCommasWindowsLinesAndNoLastNewline) {
   EXPECT_EQ(result.report.empty, 1u);
 }
 
-TEST(TextImport, DropsAndCountsEveryKindOfBadLineAndLeavesAGap) {
+TEST(TextImport, DropsEveryKindOfBadLineAndLeavesAGap) {
   const std::string good = line_of(2.0);
   const std::string cut = good.substr(0, 30) + "\n";
   const std::string glued = good.substr(0, good.size() - 1) + good;
@@ -71,12 +71,7 @@ TEST(TextImport, DropsAndCountsEveryKindOfBadLineAndLeavesAGap) {
   const ImportReport& report = result.report;
   EXPECT_EQ(report.lines, 108u);
   EXPECT_EQ(report.frames, 100u);
-  EXPECT_EQ(report.too_few, 1u);
-  EXPECT_EQ(report.too_many, 1u);
-  EXPECT_EQ(report.not_numeric, 2u);
-  EXPECT_EQ(report.malformed(), 4u);
-  EXPECT_EQ(report.non_finite, 1u);
-  EXPECT_EQ(report.out_of_range, 2u);
+  EXPECT_EQ(report.dropped(), 7u);
   EXPECT_EQ(report.empty, 1u);
   EXPECT_EQ(result.recording.frames(), 100u);
   EXPECT_DOUBLE_EQ(result.recording.time_s[50],
@@ -100,7 +95,7 @@ TEST(TextImport, RefusesWhatIsNoRecording) {
 
 TEST(TextImport, OneEndlessLineIsOneBadLine) {
   const Result result = import_text(std::string(1 << 20, '1'));
-  EXPECT_EQ(result.report.too_few, 1u);
+  EXPECT_EQ(result.report.dropped(), 1u);
   EXPECT_NE(result.error, "");
 }
 
@@ -118,8 +113,7 @@ TEST(TextImport, EveryPrefixAndRandomDamageEndInARecordingOrAnError) {
           static_cast<char>(random.bits(1'000'000 + i * 10 + j));
     }
     const Result result = import_text(damaged);
-    const ImportReport& r = result.report;
-    EXPECT_EQ(r.lines, r.frames + r.malformed() + r.non_finite + r.out_of_range + r.empty);
+    EXPECT_EQ(result.recording.frames(), result.error.empty() ? result.report.frames : 0);
     for (const float volts : result.recording.signals) ASSERT_TRUE(volts >= 0 && volts <= 3.3F);
   }
 }
@@ -131,7 +125,7 @@ TEST(TextImport, RealRecording) {
   const Recording recording = import_text_pass(std::string(folder) + "/3_Bumps/1/1.txt", report);
   EXPECT_EQ(report.lines, 9694u);
   EXPECT_EQ(report.frames, recording.frames());
-  EXPECT_EQ(report.malformed() + report.frames, report.lines);
+  EXPECT_EQ(report.dropped() + report.frames, report.lines);
   EXPECT_EQ(report.frames, 9648u);
 }
 

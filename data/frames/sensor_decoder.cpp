@@ -1,4 +1,5 @@
-// Frames that are lines: columns of text, or JSON.
+#include "data/frames/sensor_decoder.h"
+
 #include <algorithm>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -7,8 +8,7 @@
 #include <vector>
 
 #include "data/frames/binary_decoder.h"
-#include "data/frames/frame_decoder.h"
-#include "data/frames/sensor_decoder.h"
+#include "data/frames/board_frame.h"
 #include "data/frames/text_grammar.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
