@@ -9,7 +9,6 @@
 #include <span>
 #include <stdexcept>
 
-#include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/files/provenance.h"

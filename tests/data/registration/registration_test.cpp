@@ -2,7 +2,6 @@
 
 #include "data/recordings/imports/text_import.h"
 #include "data/registration/pass_features.h"
-#include "data/registration/registration.h"
 #include "tests/data/registration/lossy_pass.h"
 #include "tests/support/test.h"
 

@@ -1,6 +1,5 @@
 #include "hardware/printers/printer.h"
 
-#include "hardware/printers/printer.h"
 #include "tests/hardware/rig_support.h"
 #include "tests/support/test.h"
 

@@ -1,6 +1,5 @@
 #include "data/recordings/imports/film_truth.h"
 
-#include "data/recordings/imports/film_truth.h"
 #include "io/files/file.h"
 #include "io/numbers/random.h"
 #include "tests/support/test.h"
