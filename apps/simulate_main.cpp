@@ -9,7 +9,7 @@
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "data/plates/plate.h"
-#include "data/recordings/signal_range.h"
+#include "data/recordings/resample.h"
 #include "data/simulation/fit.h"
 #include "data/simulation/presses.h"
 #include "data/simulation/scene.h"

@@ -9,7 +9,7 @@
 #include "apps/stream/stream.h"
 #include "apps/web/web_options.h"
 #include "data/plates/plate.h"
-#include "hardware/boards/listen.h"
+#include "hardware/boards/sensor_reader.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 #include "io/files/json.h"

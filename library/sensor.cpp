@@ -6,7 +6,6 @@
 
 #include "data/frames/probe.h"
 #include "data/sensors/sensor.h"
-#include "hardware/boards/listen.h"
 #include "hardware/boards/sensor_reader.h"
 #include "library/guard.h"
 #include "library/supertac.h"

@@ -11,7 +11,7 @@
 #include "apps/common/running/threads.h"
 #include "autograd/kernels/fast/isa/isa.h"
 #include "data/sensors/rig.h"
-#include "hardware/ports/port_list.h"
+#include "hardware/ports/serial_port.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "hardware/ports/port_list.h"
+#include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 #include "io/numbers/text.h"
 

@@ -9,7 +9,6 @@
 #include "hardware/collection/capture.h"
 #include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
-#include "hardware/ports/port_list.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 

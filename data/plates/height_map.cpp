@@ -1,4 +1,4 @@
-#include "data/plates/height_map.h"
+#include "data/plates/stl.h"
 
 #include <algorithm>
 #include <cmath>

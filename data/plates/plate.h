@@ -17,7 +17,7 @@ class Plate {
   /// 6_Blob. Others: "plain", or KIND PITCH [h HEIGHT] in mm ("bumps12", "ridges6h1.5"), or several joined by
   /// '+', which share the length equally ("bumps12+ridges4"), or "random" and a number, the plate that
   /// random_plate() draws for it. Default height rig::kTextureHeightMm, for round elements (bumps, blobs) at
-  /// most pitch / 2. Or the path of an STL file of a plate's size (data/plates/height_map.h), whose plate has
+  /// most pitch / 2. Or the path of an STL file of a plate's size (data/plates/stl.h), whose plate has
   /// the file's name without folders. Throws std::invalid_argument naming the part that could not be read;
   /// FileError for an STL file.
   static Plate named(const std::string& name);

@@ -116,20 +116,6 @@ std::vector<Triangle> parse_text(std::string_view text, const std::string& name)
   return triangles;
 }
 
-std::array<float, 3> normal_of(const Triangle& t) {
-  std::array<double, 3> a{}, b{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    a[k] = double{t[1][k]} - double{t[0][k]};
-    b[k] = double{t[2][k]} - double{t[0][k]};
-  }
-  const std::array<double, 3> n = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                                   a[0] * b[1] - a[1] * b[0]};
-  const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-  if (!(length > 0)) return {};
-  return {static_cast<float>(n[0] / length), static_cast<float>(n[1] / length),
-          static_cast<float>(n[2] / length)};
-}
-
 }  // namespace
 
 std::vector<Triangle> parse_stl(std::span<const std::byte> bytes, const std::string& name) {
@@ -175,9 +161,7 @@ std::vector<std::byte> stl_bytes(const std::vector<Triangle>& triangles, std::st
   std::memcpy(bytes.data() + kTitleBytes, &count, sizeof count);
   std::byte* facet = bytes.data() + kHeadBytes;
   for (const Triangle& triangle : triangles) {
-    const auto normal = normal_of(triangle);
-    std::memcpy(facet, normal.data(), sizeof normal);
-    std::memcpy(facet + sizeof normal, &triangle, sizeof triangle);
+    std::memcpy(facet + 3 * sizeof(float), &triangle, sizeof triangle);
     facet += kFacetBytes;
   }
   return bytes;

@@ -30,9 +30,9 @@ std::vector<Triangle> parse_stl(std::span<const std::byte> bytes, const std::str
 /// The same from a file of at most kMaxStlBytes.
 std::vector<Triangle> read_stl(const std::string& path);
 
-/// A binary STL file's bytes, with unit normals (right-hand rule); `title` goes into its 80-byte header.
-/// Throws std::invalid_argument for a title that begins with "solid", by which readers would take the file
-/// for text, or more triangles than kMaxStlBytes hold.
+/// A binary STL file's bytes, normals left at 0, which readers take from the corners (right-hand rule);
+/// `title` goes into its 80-byte header. Throws std::invalid_argument for a title that begins with "solid",
+/// by which readers would take the file for text, or more triangles than kMaxStlBytes hold.
 std::vector<std::byte> stl_bytes(const std::vector<Triangle>& triangles, std::string_view title);
 
 }  // namespace supertac

@@ -31,27 +31,17 @@ constexpr Number kNumbers[] = {{"radius_mm", &Body::radius_mm, 1, 1e4},
                                {"hysteresis_s", &Body::hysteresis_s, 1e-4, 100},
                                {"creep", &Body::creep, -0.9, 10},
                                {"creep_s", &Body::creep_s, 1e-3, 1e4},
-                               {"noise", &Body::noise, 1e-9, 1}};
-constexpr double kLeastKnee = 0.01, kMostKnee = 1000;
+                               {"noise", &Body::noise, 1e-9, 1},
+                               {"knee", &Body::knee, 0.01, 1000}};
 
-template <double Body::*Member>
-double& member(Body& body) {
-  return body.*Member;
-}
-
-double& knee_of(Body& body) {
-  if (!body.knee) body.knee = kMostKnee;
-  return *body.knee;
-}
-
-constexpr BodyNumber kFitted[] = {{"skin_mm", member<&Body::skin_mm>},
-                                  {"knee", knee_of},
-                                  {"crosstalk_rows", member<&Body::crosstalk_rows>},
-                                  {"crosstalk_columns", member<&Body::crosstalk_columns>},
-                                  {"hysteresis_s", member<&Body::hysteresis_s>},
-                                  {"creep", member<&Body::creep>},
-                                  {"creep_s", member<&Body::creep_s>},
-                                  {"noise", member<&Body::noise>}};
+constexpr BodyNumber kFitted[] = {{"skin_mm", &Body::skin_mm},
+                                  {"knee", &Body::knee},
+                                  {"crosstalk_rows", &Body::crosstalk_rows},
+                                  {"crosstalk_columns", &Body::crosstalk_columns},
+                                  {"hysteresis_s", &Body::hysteresis_s},
+                                  {"creep", &Body::creep},
+                                  {"creep_s", &Body::creep_s},
+                                  {"noise", &Body::noise}};
 
 // What is left of a difference after a time.
 double left(double seconds, double constant_s) {
@@ -60,7 +50,7 @@ double left(double seconds, double constant_s) {
 
 }  // namespace
 
-Body Body::of_rig() { return {.shape = BodyShape::dome, .radius_mm = 47, .skin_mm = 4.54, .knee = {}}; }
+Body Body::of_rig() { return {.shape = BodyShape::dome, .radius_mm = 47, .skin_mm = 4.54}; }
 
 Body Body::usual(const TaxelArray& array) { return array == TaxelArray{} ? of_rig() : Body{}; }
 
@@ -80,20 +70,14 @@ void Body::check() const {
     if (!good)
       throw std::invalid_argument("\"body." + key + "\" must be " + expected + ", found " + format(found));
   };
-  Body body = *this;
   for (const auto& [key, pointer, least, most] : kNumbers) {
-    const double value = body.*pointer;
+    const double value = this->*pointer;
     expect(value == 0 || (value >= least && value <= most), key, format(least) + " to " + format(most),
            value);
   }
   expect(shape == BodyShape::flat ? radius_mm == 0 : radius_mm > 0, "radius_mm",
          "given where the shape is dome or cylinder, and nowhere else", radius_mm);
-  if (knee)
-    expect(*knee >= kLeastKnee && *knee <= kMostKnee, "knee",
-           format(kLeastKnee) + " to " + format(kMostKnee) +
-               " hard presses; leave it out where the "
-               "response is linear",
-           *knee);
+  expect(knee > 0 || !uncertainty.contains("knee"), "knee", "given where its uncertainty is", knee);
   expect((creep == 0) == (creep_s == 0), "creep_s", "given with creep, and not without", creep_s);
   for (const auto& [key, deviation] : uncertainty) {
     const auto known = [&key = key](const BodyNumber& number) { return key == number.key; };
@@ -111,7 +95,7 @@ std::span<const BodyNumber> fitted_numbers() { return kFitted; }
 BodyResponse::BodyResponse(const Body& body, const TaxelArray& array) : body_(body), array_(array) {}
 
 bool BodyResponse::neutral() const {
-  return !body_.knee && body_.crosstalk_rows == 0 && body_.crosstalk_columns == 0 &&
+  return body_.knee == 0 && body_.crosstalk_rows == 0 && body_.crosstalk_columns == 0 &&
          body_.hysteresis_s == 0 && body_.creep == 0;
 }
 
@@ -123,13 +107,13 @@ void BodyResponse::operator()(double period_s, std::span<double> shares) {
     crept_ = load_;
   }
   const double held = left(period_s, body_.hysteresis_s), young = left(period_s, body_.creep_s);
-  const double knee = body_.knee.value_or(0);
+  const double knee = body_.knee;
   for (std::size_t s = 0; s < signals; ++s) {
     const double load = shares[s];
     load_[s] = std::abs(load) >= std::abs(load_[s]) ? load : load + (load_[s] - load) * held;
     crept_[s] = load_[s] + (crept_[s] - load_[s]) * young;
     const double stood = load_[s] + body_.creep * crept_[s];
-    shares[s] = body_.knee ? stood * (1 + knee) / (std::abs(stood) + knee) : stood;
+    shares[s] = knee > 0 ? stood * (1 + knee) / (std::abs(stood) + knee) : stood;
   }
   if (body_.crosstalk_rows == 0 && body_.crosstalk_columns == 0) return;
   const auto columns = static_cast<std::size_t>(array_.columns), rows = static_cast<std::size_t>(array_.rows),
@@ -154,7 +138,6 @@ Json json_of(const Body& body) {
     if (shape == body.shape) json["shape"] = word;
   for (const auto& [key, pointer, least, most] : kNumbers)
     if (body.*pointer != 0) json[key] = body.*pointer;
-  if (body.knee) json["knee"] = *body.knee;
   for (const auto& [key, deviation] : body.uncertainty) json["uncertainty"][key] = deviation;
   return json;
 }
@@ -163,7 +146,6 @@ Body body_of(JsonObject keys) {
   Body body;
   body.shape = keys.one_of("shape", kShapes, "flat");
   for (const auto& [key, pointer, least, most] : kNumbers) body.*pointer = keys.number(key, 0);
-  if (keys.find("knee") != nullptr) body.knee = keys.number("knee");
   if (const Json* uncertainty = keys.find("uncertainty")) {
     if (!uncertainty->is_object()) keys.wrong("uncertainty", "an object {key: number}", *uncertainty);
     for (const auto& [key, deviation] : uncertainty->items()) {

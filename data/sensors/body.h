@@ -3,7 +3,6 @@
 
 #include <map>
 #include <nlohmann/json_fwd.hpp>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,8 +24,8 @@ struct Body {
   double skin_mm = 0;
   double taxel_mm = 0;  ///< side of the square that a taxel is the mean over; 0: a point
   /// A load l shows as l (1 + k) / (l + k): half of what it can show at most at l = k, as a resistor that is
-  /// pressed shows in a voltage divider. Empty: as l, a linear response.
-  std::optional<double> knee;
+  /// pressed shows in a voltage divider. 0: as l, a linear response.
+  double knee = 0;
   /// Of a passive matrix: the share of the mean of its row (of its column) that a taxel shows besides.
   double crosstalk_rows = 0, crosstalk_columns = 0;
   double hysteresis_s = 0;  ///< what is let go comes back with this time constant; what is pressed, at once
@@ -51,7 +50,7 @@ struct Body {
 /// The numbers of a body that a fit finds, by their keys.
 struct BodyNumber {
   const char* key;
-  double& (*of)(Body&);
+  double Body::*of;
 };
 std::span<const BodyNumber> fitted_numbers();
 

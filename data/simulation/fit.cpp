@@ -52,9 +52,9 @@ const Form kForms[] = {
 constexpr std::size_t kNumbers = std::size(kForms);
 
 // A number that the file states without an uncertainty is known, and is not looked for.
-std::optional<double> known(Body body, const std::string& key) {
-  if (body.uncertainty.contains(key) || (key == "knee" && !body.knee)) return {};
-  const double value = std::ranges::find(fitted_numbers(), key, &BodyNumber::key)->of(body);
+std::optional<double> known(const Body& body, const std::string& key) {
+  if (body.uncertainty.contains(key)) return {};
+  const double value = body.*std::ranges::find(fitted_numbers(), key, &BodyNumber::key)->of;
   return value != 0 ? std::optional(value) : std::nullopt;
 }
 

@@ -32,7 +32,7 @@ Body drawn(Body body, const TaxelArray& array, const RandomStream& random) {
     ++number;
     const auto found = body.uncertainty.find(key);
     if (found == body.uncertainty.end() || found->second <= 0) continue;
-    double& value = of(body);
+    double& value = body.*of;
     value = std::max(value / 4, value + found->second * random.normal(number));
   }
   if (body.skin_mm == 0) body.skin_mm = pitch * std::lerp(kLeastSkin, kMostSkin, random.uniform(kSkin));

@@ -6,10 +6,234 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
+#include "io/numbers/same_bits.h"
 
 namespace supertac {
+namespace {
+
+// Taxel gains of the rig: geometric means over fits to its recordings. Of another array nothing is known.
+constexpr double kGain[rig::kTaxels] = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20, 0.60,
+                                        0.27, 0.55, 0.20, 0.65, 0.50, 0.40, 0.10, 0.80};
+// Of three axes: how far below rest those along the plate are where nothing leans, and the skin that is
+// dragged.
+constexpr double kMiddleVolts = (rig::kRestVolts - rig::kFloorVolts) / 2, kFriction = 0.3;
+
+// Points of the pad. Along the slide they are as fine as the tip of a ridge; across it little changes.
+constexpr double kAcrossMm = 2, kAlongMm = 0.25;
+constexpr double kBeyondAcrossMm = 3.5, kBeyondAlongMm = 6.5;  // the outermost taxels
+
+// An odd number of points, `step` apart, that reach `beyond` the outermost of `lines` lines of taxels.
+int points_of(int lines, double pitch, double beyond, double step) {
+  return 2 * static_cast<int>(std::ceil(((lines - 1) / 2.0 * pitch + beyond) / step)) + 1;
+}
+int points_across(const TaxelArray& a) {
+  return points_of(a.columns, a.pitch_mm.x, kBeyondAcrossMm, kAcrossMm);
+}
+int points_along(const TaxelArray& a) { return points_of(a.rows, a.pitch_mm.y, kBeyondAlongMm, kAlongMm); }
+
+// Grid of the plate's surface: wide enough for the rig's whole pad with its centre on the plate; beyond it
+// everything is as at its edge.
+constexpr double kCellMm = 0.25, kMarginMm = 12;
+constexpr int kColumns = static_cast<int>((rig::kPlateWidthMm + 2 * kMarginMm) / kCellMm) + 1;
+constexpr int kRows = static_cast<int>((rig::kPlateLengthMm + 2 * kMarginMm) / kCellMm) + 1;
+
+// As often half as twice.
+double factor(double v) { return v >= 0 ? 1 + v : 1 / (1 - v); }
+
+// Weights of `points` places, `step` apart, for the lines (columns or rows) of taxels, [lines][points]; each
+// line sums to 1.
+std::vector<double> taxel_weights(int lines, double pitch, int points, double step, double sigma) {
+  std::vector<double> weights;
+  for (int line = 0; line < lines; ++line) {
+    const double at = (line - (lines - 1) / 2.0) * pitch;
+    const auto weight = [&](int i) { return same_bits::bell(step * (i - points / 2) - at, sigma); };
+    double sum = 0;
+    for (int i = 0; i < points; ++i) sum += weight(i);
+    for (int i = 0; i < points; ++i) weights.push_back(weight(i) / sum);
+  }
+  return weights;
+}
+
+// The same weights, each times how many sigmas its place lies from the line, which sums to the lean of a
+// load.
+std::vector<double> leaning(std::vector<double> weights, int lines, double pitch, double step, double sigma) {
+  const auto points = static_cast<int>(weights.size()) / lines;
+  for (int line = 0; line < lines; ++line)
+    for (int i = 0; i < points; ++i)
+      weights[static_cast<std::size_t>(line * points + i)] *=
+          (step * (i - points / 2) - (line - (lines - 1) / 2.0) * pitch) / sigma;
+  return weights;
+}
+
+// Streams: what belongs to the sensor, to a trial of a plate (one mounting), to a pass, and to a sample.
+std::uint64_t mounting_stream(const Plate& plate, int trial) {
+  return stream_of(plate.name() + "/" + std::to_string(trial));
+}
+std::uint64_t pass_stream(const Plate& plate, const FingerIdentity& id) {
+  return stream_of(plate.name() + "/" + std::to_string(id.trial) + "/" + std::to_string(id.pass) + "/" +
+                   std::to_string(static_cast<long long>(id.speed_mm_s * 1000)));
+}
+
+}  // namespace
+
+FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& id)
+    : settings_(settings), noise_seed_(id.seed), noise_stream_(pass_stream(plate, id) + 1) {
+  settings.array.check();
+  if (settings.array.channels != 1 && settings.array.channels != 3)
+    throw std::invalid_argument("simulator: expected an array of one channel or three axes, got " +
+                                settings.array.text());
+  if (settings_.body.skin_mm == 0) settings_.body.skin_mm = Body::of_rig().skin_mm;
+  const RandomStream sensor(id.seed, 0), trial(id.seed, mounting_stream(plate, id.trial));
+  const RandomStream pass(id.seed, pass_stream(plate, id));
+  const double variation = settings.with_variation ? 1 : 0;
+  const double spread = variation * settings.gain_spread;
+  const double common_gain = factor(spread * pass.normal(1000));
+  const double tilt_spread = variation * settings.tilt_spread;
+  const double slope_y = tilt_spread * trial.normal(1001), slope_x = tilt_spread * trial.normal(1002);
+  const bool rig = settings.array.rows == rig::kTaxelRows && settings.array.columns == rig::kTaxelColumns;
+  const auto taxels = static_cast<std::uint64_t>(settings.array.taxels());
+  const std::uint64_t drifts = 100 * (1 + taxels / 100);  // numbers that no gain has taken
+  for (std::uint64_t c = 0; c < taxels; ++c) {
+    const double own = factor(spread * trial.normal(c)) * factor(spread / 3 * pass.normal(c));
+    gain_.push_back((settings.with_gains && rig ? kGain[c] : 0.5) * own * common_gain);
+    threshold_.push_back(settings.threshold_mm * std::abs(trial.normal(2000 + c)));
+    rest_.push_back(rig::kRestVolts + variation * 0.003 * sensor.normal(c));
+    drift_.push_back(settings.drift_volts_per_s * pass.normal(drifts + c));
+  }
+  const double press = trial.normal(1003) + pass.normal(1003);
+  const double indentation = settings.indentation_mm + variation * settings.indentation_spread_mm * press;
+  indentation_mm_ = std::max(-1.8, indentation);  // it still touches the top of 2.5 mm of texture
+  vibration_phase_ = pass.uniform(1004);
+  emi_phase_ = pass.uniform(1005);
+
+  map_.resize(static_cast<std::size_t>(kColumns) * kRows);
+  for (int r = 0; r < kRows; ++r)
+    for (int c = 0; c < kColumns; ++c) {
+      const double x = c * kCellMm - kMarginMm, y = r * kCellMm - kMarginMm;
+      const bool beside = x < 0 || x > rig::kPlateWidthMm || y < 0 || y > rig::kPlateLengthMm;
+      map_[static_cast<std::size_t>(r * kColumns + c)] =
+          beside && settings.with_edges ? -3 : plate.height(x, y);
+    }
+  shape_pad(slope_x, slope_y);
+}
+
+void FingerModel::shape_pad(double slope_x, double slope_y) {
+  const double sigma = settings_.body.sigma_mm();
+  const auto [rows, columns, pitch, channels] = settings_.array;
+  across_ = points_across(settings_.array), along_ = points_along(settings_.array);
+  const auto points = [](const TaxelArray& a) {
+    return static_cast<double>(points_across(a) * points_along(a));
+  };
+  // Of a dome no more touches where the array is larger.
+  if (settings_.body.shape == BodyShape::flat)
+    settings_.mount_stiffness *= points(settings_.array) / points(TaxelArray{});
+  across_weight_ = taxel_weights(columns, pitch.x, across_, kAcrossMm, sigma);
+  along_weight_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma);
+  across_lean_ = leaning(across_weight_, columns, pitch.x, kAcrossMm, sigma);
+  along_lean_ = leaning(along_weight_, rows, pitch.y, kAlongMm, sigma);
+  double lowest = 0;
+  for (int i = 0; i < across_; ++i)
+    for (int j = 0; j < along_; ++j) {
+      const double x = kAcrossMm * (i - across_ / 2), y = kAlongMm * (j - along_ / 2);
+      rise_.push_back(settings_.body.depth_mm(x, y) + slope_x * x + slope_y * y);
+      lowest = std::min(lowest, rise_.back());
+    }
+  for (double& rise : rise_) rise -= lowest;
+}
+
+double FingerModel::surface(double x_mm, double y_mm) const {
+  const double u = std::clamp((x_mm + kMarginMm) / kCellMm, 0.0, kColumns - 1.001);
+  const double v = std::clamp((y_mm + kMarginMm) / kCellMm, 0.0, kRows - 1.001);
+  const auto c = static_cast<std::size_t>(u), r = static_cast<std::size_t>(v);
+  const double fu = u - static_cast<double>(c), fv = v - static_cast<double>(r);
+  const double* row = &map_[r * kColumns + c];
+  const double near = row[0] + fu * (row[1] - row[0]);
+  const double far = row[kColumns] + fu * (row[kColumns + 1] - row[kColumns]);
+  return near + fv * (far - near);
+}
+
+std::vector<double> FingerModel::loads(const FingerPose& pose) const {
+  return felt(indented(pose), across_weight_, along_weight_);
+}
+
+std::vector<double> FingerModel::indented(const FingerPose& pose) const {
+  std::vector<double> depth(rise_.size());
+  for (int i = 0; i < across_; ++i)
+    for (int j = 0; j < along_; ++j) {
+      const auto at = static_cast<std::size_t>(i * along_ + j);
+      const double x = kAcrossMm * (i - across_ / 2), y = kAlongMm * (j - along_ / 2);
+      depth[at] =
+          surface(pose.x_mm + x, pose.y_mm + y) - rise_[at] - pose.slope_x * x - pose.slope_y * y - pose.z_mm;
+    }
+  // Balance of the mount. The excess force is convex and falls with the lift, so Newton's steps from lift 0
+  // approach the root from below and never pass it; once the same points touch as before, the last step was
+  // exact.
+  double lift = 0, last_slope = 0;
+  for (int step = 0; settings_.with_mount && step < 12; ++step) {
+    double excess = -settings_.mount_stiffness * lift, slope = settings_.mount_stiffness;
+    for (const double d : depth) {
+      const double indented = std::max(0.0, d - lift);
+      excess += kAcrossMm * kAlongMm * indented;
+      slope += indented > 0 ? kAcrossMm * kAlongMm : 0.0;
+    }
+    if (slope == last_slope) break;
+    last_slope = slope;
+    lift += excess / slope;
+  }
+  for (double& d : depth) d -= lift;
+  return depth;
+}
+
+std::vector<double> FingerModel::felt(const std::vector<double>& indented,
+                                      const std::vector<double>& across_weight,
+                                      const std::vector<double>& along_weight) const {
+  const auto across = static_cast<std::size_t>(across_), along = static_cast<std::size_t>(along_);
+  const auto columns = static_cast<std::size_t>(settings_.array.columns);
+  std::vector<double> load(gain_.size()), rows(static_cast<std::size_t>(settings_.array.rows));
+  for (std::size_t i = 0; i < across; ++i) {
+    std::fill(rows.begin(), rows.end(), 0.0);
+    for (std::size_t j = 0; j < along; ++j) {
+      const double depth = indented[i * along + j];
+      if (depth <= 0) continue;
+      for (std::size_t row = 0; row < rows.size(); ++row) rows[row] += along_weight[row * along + j] * depth;
+    }
+    for (std::size_t k = 0; k < load.size(); ++k)
+      load[k] += across_weight[k % columns * across + i] * rows[k / columns];
+  }
+  return load;
+}
+
+std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) const {
+  FingerPose shaken = pose;
+  shaken.z_mm +=
+      settings_.vibration_mm * same_bits::rough_sine(settings_.vibration_hz * time_s + vibration_phase_);
+  const std::vector<double> depth = indented(shaken), load = felt(depth, across_weight_, along_weight_);
+  const double emi = settings_.emi_volts * same_bits::rough_sine(settings_.emi_hz * time_s + emi_phase_);
+  const auto channels = static_cast<std::size_t>(settings_.array.channels);
+  std::vector<double> volts(load.size() * channels);
+  const auto disturbed = [&](std::size_t k, double drop) {
+    return rest_[k] + drift_[k] * time_s + emi - settings_.volts_per_load * gain_[k] * drop;
+  };
+  for (std::size_t k = 0; k < load.size(); ++k)
+    volts[k * channels + channels - 1] = disturbed(k, std::max(0.0, load[k] - threshold_[k]));
+  if (channels == 3) {
+    const std::vector<double> lean_x = felt(depth, across_lean_, along_weight_),
+                              lean_y = felt(depth, across_weight_, along_lean_);
+    for (std::size_t k = 0; k < load.size(); ++k) {
+      volts[3 * k] = disturbed(k, lean_x[k]) - kMiddleVolts;
+      volts[3 * k + 1] = disturbed(k, lean_y[k] - kFriction * load[k]) - kMiddleVolts;
+    }
+  }
+  const RandomStream noise(noise_seed_, noise_stream_);
+  const auto tick = static_cast<std::uint64_t>(std::llround(std::max(0.0, time_s) * 1e6));
+  for (std::size_t s = 0; settings_.noise_volts > 0 && s < volts.size(); ++s)
+    volts[s] += settings_.noise_volts * noise.normal(tick * volts.size() + s);
+  return volts;
+}
+
 namespace {
 
 constexpr double kLiftS = rig::kLiftMm / rig::kLiftMmS;  // of onset and of release

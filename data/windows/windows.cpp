@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "data/plates/height_map.h"
+#include "data/plates/stl.h"
 #include "data/plates/plate.h"
 #include "data/plates/truth.h"
 #include "data/windows/contact_level.h"

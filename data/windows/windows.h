@@ -13,7 +13,6 @@
 #include "data/plates/truth.h"
 #include "data/recordings/recording.h"
 #include "data/recordings/resample.h"
-#include "data/recordings/signal_range.h"
 #include "data/sensors/taxel_array.h"
 #include "io/files/scratch_file.h"
 

@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <deque>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "data/clock/frame_clock.h"
+#include "data/frames/probe.h"
 #include "data/frames/sensor_decoder.h"
 #include "data/sensors/rest_tracker.h"
 #include "hardware/ports/open_port.h"
@@ -133,5 +135,11 @@ class SensorReader {
   std::uint64_t dropped_ = 0;
   std::thread thread_;
 };
+
+/// What a port sends, as bytes, to be probed (data/frames/probe.h): what comes from the opened `port` within
+/// `seconds`, in which the machine does not stand still, at most 16 MiB, or until `stop` says so. A datagram
+/// of text is a line. Throws PortError, but for the end of a port: what came until then is what there is.
+std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, double seconds,
+                          const std::function<bool()>& stop);
 
 }  // namespace supertac

@@ -12,7 +12,7 @@
 #include "data/sensors/sensor.h"
 #include "hardware/collection/journal.h"
 #include "hardware/collection/position_track.h"
-#include "hardware/printers/bed.h"
+#include "hardware/printers/palpation.h"
 
 namespace supertac {
 

@@ -21,6 +21,7 @@ namespace {
 constexpr std::uint32_t kMagic = 0x314A5453;  // "STJ1"
 constexpr std::size_t kChunkHeader = 24;      // magic, stream, length, CRC-32, time
 constexpr std::size_t kRecordHeader = 13;     // kind, time, length
+constexpr std::size_t kMostPayload = 2048;    // of whole records, where one is not longer
 constexpr double kFlushAfter = 0.1;           // of recorded time, and of the wall's
 
 template <class T>
@@ -54,18 +55,6 @@ bool parse_records(std::span<const std::byte> payload, std::vector<JournalRecord
     payload = payload.subspan(kRecordHeader + length);
   }
   return true;
-}
-
-// Whole records, as many as make a small chunk.
-std::vector<std::span<const std::byte>> parts_of(std::span<const std::byte> payload) {
-  std::vector<std::span<const std::byte>> parts;
-  for (std::size_t size = 0; !payload.empty(); size = 0) {
-    do size += kRecordHeader + get<std::uint32_t>(payload, size + 9);
-    while (size < payload.size() && size + kRecordHeader + get<std::uint32_t>(payload, size + 9) <= 2048);
-    parts.push_back(payload.first(size));
-    payload = payload.subspan(size);
-  }
-  return parts;
 }
 
 }  // namespace
@@ -119,7 +108,10 @@ void JournalWriter::append(JournalStream stream, RecordKind kind, double time_s,
     flush_due_ = true;
     wake_.notify_all();
   }
-  std::vector<std::byte>& payload = pending_[stream];
+  std::vector<std::vector<std::byte>>& chunks = pending_[stream];
+  if (chunks.empty() || chunks.back().size() + kRecordHeader + bytes.size() > kMostPayload)
+    chunks.emplace_back();
+  std::vector<std::byte>& payload = chunks.back();
   pending_bytes_ += kRecordHeader + bytes.size();
   payload.push_back(static_cast<std::byte>(kind));
   put(payload, time_s);
@@ -170,7 +162,7 @@ void JournalWriter::failed(const std::string& what) {
 }
 
 void JournalWriter::flush() {
-  std::map<JournalStream, std::vector<std::byte>> chunks;
+  decltype(pending_) chunks;
   {
     std::lock_guard lock(mutex_);
     chunks.swap(pending_);
@@ -178,10 +170,8 @@ void JournalWriter::flush() {
     flush_due_ = false;
     if (!error_.empty()) return;  // after a failed write nothing behind it would be read anyway
   }
-  for (const auto& [stream, payload] : chunks) {
-    for (const std::span<const std::byte> part : parts_of(payload))
-      write_chunk(stream, get<double>(part, 1), part);
-  }
+  for (const auto& [stream, payloads] : chunks)
+    for (const auto& payload : payloads) write_chunk(stream, get<double>(payload, 1), payload);
 }
 
 void JournalWriter::write_chunk(JournalStream stream, double time_s, std::span<const std::byte> payload) {

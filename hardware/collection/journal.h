@@ -66,7 +66,7 @@ class JournalWriter {
   int descriptor_ = -1;
   std::mutex mutex_;
   std::condition_variable wake_, stopping_;
-  std::map<JournalStream, std::vector<std::byte>> pending_;  // payloads
+  std::map<JournalStream, std::vector<std::vector<std::byte>>> pending_;  // payloads of chunks
   std::size_t pending_bytes_ = 0;
   std::uint64_t bytes_ = 0, most_bytes_;
   double oldest_pending_ = 0;  // recorded time of the first record in pending_

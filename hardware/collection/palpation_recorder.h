@@ -9,7 +9,7 @@
 #include "data/sensors/sensor.h"
 #include "hardware/boards/sensor_reader.h"
 #include "hardware/collection/capture.h"
-#include "hardware/printers/bed.h"
+#include "hardware/printers/palpation.h"
 
 namespace supertac {
 

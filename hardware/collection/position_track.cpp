@@ -3,15 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hardware/printers/motion_model.h"
+#include "hardware/printers/printer.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {
-
-// More than so many samples that do not fit are not noise: a cable that damages 0.2 % of the bytes spoils 3
-// %.
 
 // How far along the leg's straight line the sample is, and how far from it, ends included.
 struct OnLeg {

@@ -14,7 +14,6 @@
 #include <optional>
 
 #include "hardware/ports/errors.h"
-#include "hardware/ports/port_list.h"
 #include "hardware/ports/serial_port.h"
 #include "hardware/ports/serial_termios.h"
 #include "io/numbers/numbers.h"

@@ -1,4 +1,4 @@
-#include "hardware/printers/machine_state.h"
+#include "hardware/printers/printer.h"
 
 #include <algorithm>
 #include <cstdio>

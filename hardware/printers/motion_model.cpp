@@ -1,4 +1,4 @@
-#include "hardware/printers/motion_model.h"
+#include "hardware/printers/printer.h"
 
 #include <algorithm>
 #include <cmath>

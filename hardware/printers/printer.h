@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "hardware/printers/machine_state.h"
+#include "hardware/printers/printer.h"
 #include "hardware/printers/marlin_link.h"
 
 namespace supertac {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "hardware/printers/marlin_line.h"
-#include "hardware/printers/motion_model.h"
+#include "hardware/printers/printer.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "data/recordings/signal_range.h"
+#include "data/recordings/resample.h"
 #include "data/windows/random_passes.h"
 #include "data/windows/signal_remarks.h"
 #include "io/numbers/numbers.h"

@@ -82,7 +82,7 @@ def _check(path: Path, recording: Recording) -> None:
 
 
 def contradiction(volts: Array, stated: dict[str, Any]) -> str:
-    """Why these cannot be signals of a sensor that is stated so, as data/recordings/signal_range.h; "" where they can."""
+    """Why these cannot be signals of a sensor that is stated so, as data/recordings/resample.h; "" where they can."""
     if "range" not in stated or not volts.size:
         return ""
     (low, high), least, most = stated["range"], float(volts.min()), float(volts.max())

@@ -5,7 +5,6 @@
 #include <span>
 #include <stdexcept>
 
-#include "data/plates/height_map.h"
 #include "data/plates/stl.h"
 #include "io/files/file.h"
 

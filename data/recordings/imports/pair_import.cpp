@@ -5,7 +5,7 @@
 
 #include "data/recordings/imports/film_truth.h"
 #include "data/recordings/imports/table_import.h"
-#include "data/recordings/signal_range.h"
+#include "data/recordings/resample.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 

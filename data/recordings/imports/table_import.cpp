@@ -6,7 +6,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "data/recordings/signal_range.h"
+#include "data/recordings/resample.h"
 #include "data/sensors/rest_tracker.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"

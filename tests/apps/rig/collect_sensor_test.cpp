@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "data/recordings/recording.h"
-#include "data/simulation/finger_model.h"
+#include "data/simulation/simulator.h"
 #include "hardware/collection/collection.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"

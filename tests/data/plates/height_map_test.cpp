@@ -1,4 +1,4 @@
-#include "data/plates/height_map.h"
+#include "data/plates/stl.h"
 
 #include "io/files/file.h"
 #include "tests/support/test.h"

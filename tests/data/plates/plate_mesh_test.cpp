@@ -1,6 +1,6 @@
 #include "data/plates/plate_mesh.h"
 
-#include "data/plates/height_map.h"
+#include "data/plates/stl.h"
 #include "io/numbers/random.h"
 #include "tests/support/test.h"
 

@@ -1,4 +1,4 @@
-#include "data/recordings/signal_range.h"
+#include "data/recordings/resample.h"
 
 #include "data/simulation/simulator.h"
 #include "tests/support/test.h"

@@ -39,9 +39,8 @@ TEST(Body, RefusalsNameTheKey) {
        "\"body.radius_mm\" must be given where the shape is dome or cylinder, and nowhere "
        "else, found 0"},
       {R"({"creep": 0.1})", "\"body.creep_s\" must be given with creep, and not without, found 0"},
-      {R"({"knee": 0})",
-       "\"body.knee\" must be 0.01 to 1000 hard presses; leave it out where the response is "
-       "linear, found 0"},
+      {R"({"knee": 0.001})", "\"body.knee\" must be 0.01 to 1000, found 0.001"},
+      {R"({"uncertainty": {"knee": 0.1}})", "\"body.knee\" must be given where its uncertainty is, found 0"},
       {R"({"skin_mm": -1})", "\"body.skin_mm\" must be 0.01 to 100, found -1"},
       {R"({"uncertainty": {"shape": 1}})",
        "\"body.uncertainty\" must name what a fit finds (skin_mm, knee, crosstalk_rows, crosstalk_columns, "

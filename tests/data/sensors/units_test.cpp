@@ -1,6 +1,6 @@
 // Unit and polarity on the way from a recording to windows.
 
-#include "data/recordings/signal_range.h"
+#include "data/recordings/resample.h"
 #include "data/simulation/simulator.h"
 #include "data/windows/random_passes.h"
 #include "data/windows/windows.h"

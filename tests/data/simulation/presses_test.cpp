@@ -1,6 +1,6 @@
 #include "data/simulation/presses.h"
 
-#include "data/recordings/signal_range.h"
+#include "data/recordings/resample.h"
 #include "data/simulation/scene.h"
 #include "tests/support/test.h"
 

@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include "hardware/boards/listen.h"
 #include "hardware/collection/capture.h"
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"

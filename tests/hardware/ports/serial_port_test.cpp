@@ -11,7 +11,6 @@
 #include <thread>
 
 #include "hardware/ports/errors.h"
-#include "hardware/ports/port_list.h"
 #include "hardware/ports/serial_termios.h"
 #include "hardware/virtual_rig/pty_rig.h"
 #include "tests/hardware/rig_support.h"

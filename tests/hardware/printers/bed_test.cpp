@@ -1,4 +1,4 @@
-#include "hardware/printers/bed.h"
+#include "hardware/printers/palpation.h"
 
 #include <nlohmann/json.hpp>
 

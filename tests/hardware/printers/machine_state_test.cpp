@@ -1,5 +1,5 @@
 // Printers as another job, a display or a start of their own left them.
-#include "hardware/printers/machine_state.h"
+#include "hardware/printers/printer.h"
 
 #include "tests/hardware/fault_run.h"
 #include "tests/hardware/rig_support.h"
