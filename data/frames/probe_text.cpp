@@ -105,11 +105,6 @@ std::optional<FoundFormat> found_by_roles(TextGrammar& grammar, double seconds,
   return found;
 }
 
-std::optional<FoundFormat> columns_of(const Lines& lines, std::vector<std::string>& says) {
-  auto grammar = find_grammar(lines.raw);
-  return grammar ? found_by_roles(*grammar, lines.seconds, says) : std::nullopt;
-}
-
 void sizes_of(const nlohmann::ordered_json& json, std::vector<std::size_t>& nested) {
   if (!json.is_array() || json.empty()) return;
   nested.push_back(json.size());
@@ -198,10 +193,6 @@ bool is_object(std::string_view line) {
   }
 }
 
-std::string shown(std::string_view line) {
-  return in_quotes(line.substr(0, std::min<std::size_t>(line.size(), 60)));
-}
-
 }  // namespace
 
 std::optional<TaxelArray> assumed_array(std::size_t values, std::span<const std::size_t> nested) {
@@ -229,7 +220,7 @@ std::optional<FoundFormat> find_text_format(const std::string& bytes, double sec
     return std::nullopt;
   }
   says.push_back(std::to_string(lines.text.size()) + " lines, such as " +
-                 shown(lines.text[lines.text.size() / 2]));
+                 in_quotes(lines.text[lines.text.size() / 2].substr(0, 60)));
   if (2 * static_cast<std::size_t>(std::ranges::count_if(lines.text, from_printer)) > lines.text.size()) {
     says.push_back("a printer's firmware answers here; choose the sensor's port (supertac-check machine)");
     return std::nullopt;
@@ -242,7 +233,8 @@ std::optional<FoundFormat> find_text_format(const std::string& bytes, double sec
         "its taxels as one, such as {\"values\": [1, 2, 3, 4]}");
     return std::nullopt;
   }
-  if (!found) found = columns_of(lines, says);
+  if (auto grammar = found ? std::nullopt : find_grammar(lines.raw))
+    found = found_by_roles(*grammar, lines.seconds, says);
   if (!found && says.size() == before)
     says.push_back(
         "a log, or words: no columns of numbers, and no JSON; choose the sensor's port, or its firmware");

@@ -23,17 +23,6 @@ bool constant(const std::vector<double>& v) {
   return std::ranges::all_of(v, [&](double x) { return x == v[0] || (std::isnan(x) && std::isnan(v[0])); });
 }
 
-/// The steps, of numbers that begin anew at `modulus` (0: never).
-std::vector<double> steps(const std::vector<double>& v, double modulus) {
-  std::vector<double> all;
-  for (std::size_t i = 1; i < v.size(); ++i) {
-    double step = v[i] - v[i - 1];
-    if (modulus > 0 && step < 0) step += modulus;
-    all.push_back(step);
-  }
-  return all;
-}
-
 bool counts(const std::vector<double>& v) {
   if (v.size() < kFew || !whole(v) || constant(v)) return false;
   const double high = std::ranges::max(v), low = std::ranges::min(v);
@@ -58,7 +47,9 @@ double steady_step(const std::vector<double>& v) {
   if (v.size() < kFew || constant(v)) return 0;
   for (const double modulus : {0.0, 65536.0, 4294967296.0}) {
     if (modulus > 0 && std::ranges::max(v) >= modulus) continue;
-    std::vector<double> all = steps(v, modulus);
+    std::vector<double> all;  // steps
+    for (std::size_t i = 1; i < v.size(); ++i)
+      all.push_back(v[i] - v[i - 1] + (modulus > 0 && v[i] < v[i - 1] ? modulus : 0));
     const auto fell = static_cast<double>(std::ranges::count_if(all, [](double s) { return s < 0; }));
     const double usual = quantile(all, 0.5), early = quantile(all, 0.1), late = quantile(all, 0.9);
     const double mean = (v.back() - v.front()) / static_cast<double>(all.size());

@@ -56,41 +56,37 @@ std::vector<double> binned(const Recording& recording, int taxel, std::size_t bi
 }
 
 // Where the signal falls to `level` when walking from `at` in direction `step` (bins, interpolated).
-double crossing(const std::vector<double>& x, std::ptrdiff_t at, std::ptrdiff_t step, double level) {
-  while (x[static_cast<std::size_t>(at)] > level) at += step;
-  const double outside = x[static_cast<std::size_t>(at)], inside = x[static_cast<std::size_t>(at - step)];
+double crossing(const double* x, std::ptrdiff_t at, std::ptrdiff_t step, double level) {
+  while (x[at] > level) at += step;
+  const double outside = x[at], inside = x[at - step];
   return static_cast<double>(at) - static_cast<double>(step) * (level - outside) / (inside - outside);
 }
 
-// Lowest value met when walking away from a top until something higher, the reach, or the end.
-double rim(const std::vector<double>& x, std::ptrdiff_t top, std::ptrdiff_t step, std::ptrdiff_t reach) {
-  const double height = x[static_cast<std::size_t>(top)];
-  double lowest = height;
-  for (std::ptrdiff_t n = 1, at = top + step;
-       n <= reach && at >= 0 && at < static_cast<std::ptrdiff_t>(x.size()); ++n, at += step) {
-    const double value = x[static_cast<std::size_t>(at)];
-    if (value > height + kFlatV) break;
-    lowest = std::min(lowest, value);
+// Lowest value met when walking away from a top until something higher, the reach, or the end of n bins.
+double rim(const double* x, std::ptrdiff_t n, std::ptrdiff_t top, std::ptrdiff_t step, std::ptrdiff_t reach) {
+  double lowest = x[top];
+  for (std::ptrdiff_t at = top + step; std::abs(at - top) <= reach && at >= 0 && at < n; at += step) {
+    if (x[at] > x[top] + kFlatV) break;
+    lowest = std::min(lowest, x[at]);
   }
   return lowest;
 }
 
-void find_in(const std::vector<double>& x, int taxel, double start_s, double reach_s,
+void find_in(const std::vector<double>& bins, int taxel, double start_s, double reach_s,
              std::vector<Contact>& found) {
-  const auto n = static_cast<std::ptrdiff_t>(x.size());
+  const double* const x = bins.data();
+  const auto n = static_cast<std::ptrdiff_t>(bins.size());
   const auto reach = static_cast<std::ptrdiff_t>(reach_s / kBinS);
-  const std::size_t first = found.size();
+  const auto first = static_cast<std::ptrdiff_t>(found.size());
   double deepest = 0;
   for (std::ptrdiff_t i = 1; i + 1 < n; ++i) {
-    if (x[static_cast<std::size_t>(i)] <= x[static_cast<std::size_t>(i - 1)]) continue;
+    if (x[i] <= x[i - 1]) continue;
     std::ptrdiff_t j = i;  // a saturated top is a plateau i..j
-    while (j + 1 < n &&
-           std::abs(x[static_cast<std::size_t>(j + 1)] - x[static_cast<std::size_t>(i)]) < kFlatV)
-      ++j;
-    if (j + 1 >= n || x[static_cast<std::size_t>(j + 1)] > x[static_cast<std::size_t>(i)]) continue;
-    const double depth = x[static_cast<std::size_t>(i)] - std::max(rim(x, i, -1, reach), rim(x, j, 1, reach));
+    while (j + 1 < n && std::abs(x[j + 1] - x[i]) < kFlatV) ++j;
+    if (j + 1 >= n || x[j + 1] > x[i]) continue;
+    const double depth = x[i] - std::max(rim(x, n, i, -1, reach), rim(x, n, j, 1, reach));
     if (depth < kMinDepthV) continue;
-    const double level = x[static_cast<std::size_t>(i)] - depth / 2;
+    const double level = x[i] - depth / 2;
     const double left = crossing(x, i, -1, level), right = crossing(x, j, 1, level);
     deepest = std::max(deepest, depth);
     found.push_back(
@@ -98,8 +94,7 @@ void find_in(const std::vector<double>& x, int taxel, double start_s, double rea
     i = j;
   }
   const auto shallow = [&](const Contact& c) { return c.depth_v < kMinShare * deepest; };
-  found.erase(std::remove_if(found.begin() + static_cast<std::ptrdiff_t>(first), found.end(), shallow),
-              found.end());
+  found.erase(std::remove_if(found.begin() + first, found.end(), shallow), found.end());
 }
 
 }  // namespace

@@ -92,8 +92,7 @@ class Fit {
     for (double factor = kSlowest; factor < kFastest; factor *= 1 + kRateStep)
       for (double offset = -kMiddleReachMm; offset <= kMiddleReachMm; offset += kMiddleStepMm)
         lines.push_back(scored(rig::kPlateLengthMm / 2 + offset, speed_ * factor));
-    for (const Line& line : lines)
-      if (line.score > best.score) best = line;
+    best = *std::ranges::max_element(lines, {}, &Line::score);
     for (const Line& line : lines)
       if (elsewhere(line, best) && line.score > rival.score) rival = line;
   }
@@ -152,11 +151,8 @@ class Fit {
   double pitch() const { return least_pitch(crests_, 12); }
 
   std::size_t nearest_crest(double y) const {
-    std::size_t nearest = 0;
-    double distance = std::abs(crests_[0] - y);
-    for (std::size_t j = 1; j < crests_.size(); ++j)
-      if (const double d = std::abs(crests_[j] - y); d < distance) distance = d, nearest = j;
-    return nearest;
+    const auto away = [y](double crest) { return std::abs(crest - y); };
+    return static_cast<std::size_t>(std::ranges::min_element(crests_, {}, away) - crests_.begin());
   }
 
   static bool inside(const Contact& c, const Stretch& s) {

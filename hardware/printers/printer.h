@@ -3,8 +3,8 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "hardware/printers/printer.h"
 #include "hardware/printers/marlin_link.h"
 
 namespace supertac {
@@ -26,6 +26,38 @@ struct Limits {
   bool operator==(const Limits&) const = default;
 };
 
+/// Where the firmware itself cuts moves of a homed machine, without a word.
+struct SoftLimits {
+  Point3 low, high;
+  std::string text;  ///< as it said them
+};
+/// M211; nothing where they are off or not told.
+std::optional<SoftLimits> soft_limits_of(MarlinLink& link);
+
+/// What another job may have left on in a printer, and a run depends on: each state is set before the first
+/// length is sent, read back where the firmware tells it, and given back at the end. The states are a table,
+/// in machine_state.cpp: state, how set, how read, what if not.
+class MachineState {
+ public:
+  /// Sets every state that this firmware has; one that it does not know it does not have. Again, it sets them
+  /// again (homing switches mesh compensation on) and remembers what it found the first time. `homed`: also
+  /// refuses what shifts a homed machine and nothing else. Throws PrinterRefused that names a state which
+  /// stays another, and as MarlinLink::command.
+  void set(MarlinLink& link, bool homed);
+
+  /// What was changed becomes as it was found, where that was told.
+  void put_back(MarlinLink& link);
+  /// What stays as it was set, "plane (G17), ...": what the firmware does not tell, or was not put back.
+  std::string kept() const;
+
+ private:
+  struct Changed {
+    std::string name;  // with the command that set it
+    std::string back;  // commands; empty: nothing told what it was
+  };
+  std::vector<Changed> changed_;
+};
+
 constexpr double kStopWithin = 1.6;  ///< s, of the 2 in which Ctrl-C ends a program; M410 takes one of them
 
 constexpr double kToleranceMm = 0.05;  ///< positions so near are the same: answers are rounded
@@ -33,6 +65,16 @@ constexpr double kToleranceMm = 0.05;  ///< positions so near are the same: answ
 /// The line that makes a straight move, and the one that says where the head is.
 std::string move_command(const Point3& target, double speed_mm_s);
 std::string origin_command(const Point3& here);
+
+// One straight move with acceleration: the trapezoid of speed over time.
+
+/// Distance covered `t` seconds into a move of `distance` mm that lasts `duration` s: symmetric acceleration
+/// `acceleration` (mm/s^2) at both ends, constant speed v between, where v solves
+/// distance = v (duration - v / acceleration). Clamped to [0, distance].
+double trapezoid_position(double t, double distance, double duration, double acceleration);
+
+/// Duration (s) of a move of `distance` mm whose top speed is at most `speed` (mm/s).
+double trapezoid_duration(double distance, double speed, double acceleration);
 
 /// Where the head was (M114 R), and when: the middle of question and answer.
 struct PositionSample {
