@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "data/plates/stl.h"
 #include "data/plates/plate.h"
+#include "data/plates/stl.h"
 #include "data/plates/truth.h"
 #include "data/windows/contact_level.h"
 #include "data/windows/transforms/normalise_window.h"

@@ -75,7 +75,7 @@ class FakeDevice {
     ASSERT_EQ(getsockname(file, reinterpret_cast<sockaddr*>(&address_), &size), 0);
     port_ = prefix + std::to_string(ntohs(address_.sin_port));
     if (type == SOCK_STREAM) {
-      ASSERT_EQ(listen(file, 1), 0);
+      ASSERT_EQ(::listen(file, 1), 0);
       listening_ = file;
       return;
     }

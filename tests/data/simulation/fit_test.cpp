@@ -41,7 +41,7 @@ TEST(BodyFit, FindsKnownBodiesWithinTheStatedUncertainty) {
       ++told, ++of[number.key];
       for (const auto& [key, member] : fitted_numbers())
         if (key == number.key) {
-          const double off = std::abs(member(truth.body) - number.value) / number.deviation;
+          const double off = std::abs(truth.body.*member - number.value) / number.deviation;
           within += off<2, farther += off> 4;
         }
     }

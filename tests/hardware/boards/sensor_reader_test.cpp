@@ -187,7 +187,7 @@ TEST(SensorReader, ReadsTcpUntilTheOtherSideIsGone) {
   const int port = free_port(SOCK_STREAM), server = socket(AF_INET, SOCK_STREAM, 0);
   const sockaddr_in at = at_port(port);
   ASSERT_EQ(bind(server, reinterpret_cast<const sockaddr*>(&at), sizeof at), 0);
-  ASSERT_EQ(listen(server, 1), 0);
+  ASSERT_EQ(::listen(server, 1), 0);
   SensorReader reader(open_port("tcp:127.0.0.1:" + std::to_string(port)), sensor);
   const int client = accept(server, nullptr, nullptr);
   for (int n = 0; n < 50; ++n) {
