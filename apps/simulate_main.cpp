@@ -12,7 +12,6 @@
 #include "data/recordings/resample.h"
 #include "data/simulation/fit.h"
 #include "data/simulation/presses.h"
-#include "data/simulation/scene.h"
 #include "data/simulation/simulator.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/parallel.h"

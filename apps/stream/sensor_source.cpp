@@ -6,8 +6,8 @@
 
 #include "apps/common/running/signals.h"
 #include "hardware/boards/sensor_reader.h"
-#include "hardware/collection/capture.h"
 #include "hardware/collection/collection.h"
+#include "hardware/collection/journal.h"
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"

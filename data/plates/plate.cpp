@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "data/plates/random_plate.h"
 #include "data/plates/stl.h"
+#include "data/plates/surface.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/same_bits.h"

@@ -65,7 +65,7 @@ std::vector<std::string> rig_plates();
 const std::vector<std::string>& default_plates();
 
 /// The plate called "random<number>": what networks for unseen plates are trained and tested on
-/// (data/plates/random_plate.h says how it is drawn).
+/// (data/plates/surface.h says how it is drawn).
 Plate random_plate(std::uint32_t number);
 
 /// True when both have a texture of the same kind whose pitches differ by less than half a millimetre: a

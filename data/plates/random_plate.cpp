@@ -1,4 +1,5 @@
-#include "data/plates/random_plate.h"
+// What random plates look like.
+#include "data/plates/surface.h"
 
 #include <algorithm>
 #include <cmath>

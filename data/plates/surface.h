@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -36,5 +38,18 @@ struct Texture {
   /// The texture is laid out in [from, to], centred, as many elements as fit whole.
   double from_mm = rig::kTextureFromMm, to_mm = rig::kTextureToMm;
 };
+
+/// What is drawn for a random plate: regular textures, or a surface of its own; neither: a plain plate.
+struct DrawnPlate {
+  std::vector<Texture> textures = {};
+  std::shared_ptr<const Surface> surface = {};
+};
+
+/// Kinds, layouts and sizes are drawn from the number alone:
+///   plain                                                            1 in 16
+///   equal elements in rows (ridges, bumps, blobs, waves), or two such textures one behind the other
+///   lines with a pitch of their own each, some oblique; single lines; scattered round elements; smooth hills
+/// Pitches 4 to 15 mm, heights .5 to 3 mm; more than half of the lines and rounds have the size of the rig's.
+DrawnPlate draw_plate(std::uint32_t number);
 
 }  // namespace supertac

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "data/simulation/scene.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/same_bits.h"

@@ -1,4 +1,5 @@
-#include "data/simulation/scene.h"
+// What presses an array.
+#include "data/simulation/presses.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,5 @@
-#include "hardware/collection/capture.h"
+// Ports whose bytes a journal keeps, or has kept.
+#include "hardware/collection/journal.h"
 
 #include <algorithm>
 #include <utility>

@@ -8,7 +8,7 @@
 
 #include "data/sensors/sensor.h"
 #include "hardware/boards/sensor_reader.h"
-#include "hardware/collection/capture.h"
+#include "hardware/collection/journal.h"
 #include "hardware/printers/palpation.h"
 
 namespace supertac {

@@ -1,7 +1,6 @@
 #include "data/simulation/presses.h"
 
 #include "data/recordings/resample.h"
-#include "data/simulation/scene.h"
 #include "tests/support/test.h"
 
 namespace supertac::presses_test {

@@ -2,7 +2,7 @@
 
 #include <unistd.h>
 
-#include "hardware/collection/capture.h"
+#include "hardware/collection/journal.h"
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
 #include "hardware/printers/marlin_link.h"

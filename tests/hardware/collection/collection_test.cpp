@@ -1,6 +1,6 @@
 #include "hardware/collection/collection.h"
 
-#include "hardware/collection/capture.h"
+#include "hardware/collection/journal.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/ports/errors.h"
 #include "tests/hardware/rig_support.h"
