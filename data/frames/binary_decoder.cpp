@@ -103,10 +103,12 @@ BinaryLayout::BinaryLayout(const FrameFormat& format, std::size_t count) {
   size = at + checksum_bytes(format.checksum) + format.trailer.size();
 }
 
-BinaryDecoder::BinaryDecoder(const Sensor& sensor)
-    : format_(sensor.frame), value_bytes_(bytes_of(sensor.frame.type)), layout_(format_, sensor.values()) {
-  vague_ = format_.checksum == "none" && format_.trailer.empty();
-}
+BinaryDecoder::BinaryDecoder(const FrameFormat& format, std::size_t values, bool certain)
+    : format_(format),
+      value_bytes_(bytes_of(format.type)),
+      layout_(format, values),
+      certain_(certain),
+      vague_(format.checksum == "none" && format.trailer.empty()) {}
 
 bool BinaryDecoder::has_header(const std::byte* start, std::size_t left) const {
   const std::size_t count = std::min(left, format_.header.size());
@@ -133,7 +135,7 @@ std::optional<bool> BinaryDecoder::accepts() const {
   if (!has_header(start, left)) return false;
   if (left < size()) return std::nullopt;
   if (!is_frame(start)) return false;
-  if (vague_ || (ever_ && discarded_ <= 2 * size())) return true;
+  if (vague_ || certain_ || (ever_ && discarded_ <= 2 * size())) return true;
   if (left < 2 * size()) return std::nullopt;
   return is_frame(start + size());
 }

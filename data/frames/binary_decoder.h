@@ -31,13 +31,22 @@ struct BinaryLayout {
 /// up to eight frames. So values that hold the header's bytes cost no frame.
 class BinaryDecoder : public SensorDecoder {
  public:
-  explicit BinaryDecoder(const Sensor& sensor);
+  explicit BinaryDecoder(const Sensor& sensor) : BinaryDecoder(sensor.frame, sensor.values(), false) {}
   void push(std::span<const std::byte> bytes, const Sink& sink) override;
   /// Bytes of a whole frame.
   std::size_t size() const { return layout_.size; }
+  /// Bytes kept for the next push().
+  std::size_t pending() const { return buffer_.size() - position_; }
+
+ protected:
+  /// `certain`: is_frame() alone tells a frame, wherever it stands.
+  BinaryDecoder(const FrameFormat& format, std::size_t values, bool certain);
+  virtual bool is_frame(const std::byte* start) const;
+  virtual void hand_over(const std::byte* start, const Sink& sink);
+  /// Bytes before the frame that is handed over, back to the one before, that were none.
+  std::size_t discarded() const { return discarded_; }
 
  private:
-  bool is_frame(const std::byte* start) const;
   bool has_header(const std::byte* start, std::size_t left) const;
   /// Whether what stands at position_ is to be taken; nothing while more bytes must tell.
   std::optional<bool> accepts() const;
@@ -46,12 +55,11 @@ class BinaryDecoder : public SensorDecoder {
   /// How often the header stands at place + n size in turn, up to kMostReturns; whether it may go on.
   std::pair<std::size_t, bool> returns(std::size_t place) const;
   void discard(std::size_t count);
-  void hand_over(const std::byte* start, const Sink& sink);
 
   FrameFormat format_;
   std::size_t value_bytes_;
   BinaryLayout layout_;
-  bool vague_;  // nothing behind the values tells a whole frame from a torn one
+  bool certain_, vague_;  // vague: nothing behind the values tells a whole frame from a torn one
   std::vector<std::byte> buffer_;
   std::size_t position_ = 0;
   std::size_t discarded_ = 0;  // bytes since the last frame

@@ -1,7 +1,6 @@
 #include "data/frames/board_frame.h"
 
 #include <cstdlib>
-#include <cstring>
 #include <stdexcept>
 #include <string>
 
@@ -67,38 +66,22 @@ bool JumpDetector::jump(const BoardFrame& frame) {
   return flag;
 }
 
-void FrameDecoder::append(std::span<const std::byte> bytes) {
-  // What is left of the last push is less than a frame, so moving it to the front is cheap.
-  buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(position_));
-  position_ = 0;
-  buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
-  counters_.bytes += bytes.size();
-}
+BoardDecoder::BoardDecoder()
+    : BinaryDecoder({.kind = FrameKind::binary,
+                     .header = {std::to_integer<char>(kFrameHeader)},
+                     .trailer = {std::to_integer<char>(kFrameTrailer)},
+                     .fields = {{.is = FrameField::Is::skip, .count = rig::kFrameBytes - 2}}},
+                    0, true) {}
 
-const std::byte* FrameDecoder::next() {
-  for (;;) {
-    const std::size_t left = buffer_.size() - position_;
-    const std::byte* start = buffer_.data() + position_;
-    if (left > 0 && *start != kFrameHeader) {
-      const void* header = std::memchr(start, std::to_integer<int>(kFrameHeader), left);
-      discard(header == nullptr ? left
-                                : static_cast<std::size_t>(static_cast<const std::byte*>(header) - start));
-      continue;
-    }
-    if (left < rig::kFrameBytes) return nullptr;
-    if (is_frame(start)) {
-      position_ += rig::kFrameBytes;
-      ++counters_.frames;
-      return start;
-    }
-    discard(1);
-  }
-}
-
-void FrameDecoder::discard(std::size_t count) {
-  position_ += count;
-  discarded_since_frame_ += count;
-  counters_.discarded_bytes += count;
+void BoardDecoder::hand_over(const std::byte* start, const Sink& sink) {
+  frame_ = parse_frame(start);
+  const auto volts = taxel_volts(frame_);
+  ++counters_.frames;
+  sink({.values = volts,
+        .time_s = std::nullopt,
+        .damaged = damaged_frames(discarded()),
+        .suspect = discarded() > 0,
+        .jump = jumps_.jump(frame_)});
 }
 
 }  // namespace supertac

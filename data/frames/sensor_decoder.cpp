@@ -7,7 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "data/frames/binary_decoder.h"
 #include "data/frames/board_frame.h"
 #include "data/frames/text_grammar.h"
 #include "io/files/json.h"
@@ -119,29 +118,6 @@ class JsonDecoder : public LineDecoder {
   }
 };
 
-/// The rig's board.
-class RigDecoder : public SensorDecoder {
- public:
-  void push(std::span<const std::byte> bytes, const Sink& sink) override {
-    decoder_.push(bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
-      counters_.torn += discarded > 0 ? 1 : 0;
-      const auto volts = taxel_volts(frame);
-      sink({.values = volts,
-            .time_s = std::nullopt,
-            .damaged = damaged_frames(discarded),
-            .suspect = discarded > 0,
-            .jump = jumps_.jump(frame)});
-    });
-    const FrameDecoder::Counters& counted = decoder_.counters();
-    counters_.bytes = counted.bytes, counters_.frames = counted.frames;
-    counters_.discarded_bytes = counted.discarded_bytes;
-  }
-
- private:
-  FrameDecoder decoder_;
-  JumpDetector jumps_;
-};
-
 }  // namespace
 
 bool flatten(const nlohmann::ordered_json& json, std::vector<float>& numbers) {
@@ -163,7 +139,7 @@ std::unique_ptr<SensorDecoder> make_decoder(const Sensor& sensor) {
     case FrameKind::board:
       break;
   }
-  return std::make_unique<RigDecoder>();
+  return std::make_unique<BoardDecoder>();
 }
 
 }  // namespace supertac

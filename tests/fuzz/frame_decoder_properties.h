@@ -17,16 +17,16 @@ inline void check_frame_decoder(std::span<const std::byte> input) {
   if (input.empty()) return;
   const std::size_t piece = 1 + std::to_integer<std::size_t>(input[0]);
   const auto stream = input.subspan(1);
-  FrameDecoder whole, pieces;
+  BoardDecoder whole, pieces;
   std::vector<BoardFrame> expected, found;
-  whole.push(stream, [&](const BoardFrame& frame, std::uint64_t) { expected.push_back(frame); });
+  whole.push(stream, [&](const DecodedFrame&) { expected.push_back(whole.frame()); });
   for (std::size_t at = 0; at < stream.size(); at += piece) {
     pieces.push(stream.subspan(at, std::min(piece, stream.size() - at)),
-                [&](const BoardFrame& frame, std::uint64_t) { found.push_back(frame); });
+                [&](const DecodedFrame&) { found.push_back(pieces.frame()); });
   }
   if (expected != found) throw std::logic_error("frame decoder: pieces give other frames than the whole");
-  for (const FrameDecoder* decoder : {&whole, &pieces}) {
-    const FrameDecoder::Counters& counters = decoder->counters();
+  for (const BoardDecoder* decoder : {&whole, &pieces}) {
+    const BoardDecoder::Counters& counters = decoder->counters();
     if (counters.frames * rig::kFrameBytes + counters.discarded_bytes + decoder->pending() !=
             counters.bytes ||
         counters.bytes != stream.size() || decoder->pending() >= rig::kFrameBytes) {

@@ -55,11 +55,11 @@ std::string check_moves(std::vector<std::string> ran, std::vector<std::string> p
 // reads: those may be late alone.
 std::string check_frames(const Journal& journal, const NumberedBoard& board, const Collection& collection) {
   std::vector<std::uint64_t> numbers;
-  FrameDecoder decoder;
+  BoardDecoder decoder;
   for (const JournalRecord& record : journal.of(JournalStream::board)) {
-    decoder.push(record.bytes, [&](const BoardFrame& frame, std::uint64_t) {
+    decoder.push(record.bytes, [&](const DecodedFrame&) {
       for (const std::uint64_t number :
-           board.numbers_in([&](std::size_t k) { return frame.taxel(static_cast<int>(k)); }))
+           board.numbers_in([&](std::size_t k) { return decoder.frame().taxel(static_cast<int>(k)); }))
         numbers.push_back(number);
     });
   }

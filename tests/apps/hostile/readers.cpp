@@ -166,8 +166,8 @@ std::vector<Reader> readers(const std::string& folder) {
        [](const Bytes& b) { (void)parse_reply(text_of(b)); }},
       {"frames", frames,
        [](const Bytes& b) {
-         FrameDecoder decoder;
-         decoder.push(b, [](const BoardFrame&, std::uint64_t) {});
+         BoardDecoder decoder;
+         decoder.push(b, [](const DecodedFrame&) {});
        }},
       {"plate", bytes_of("bumps12+ridges6h1.5"),
        [](const Bytes& b) {

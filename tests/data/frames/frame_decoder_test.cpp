@@ -5,12 +5,12 @@
 
 namespace supertac::frame_decoder_test {
 
-std::vector<BoardFrame> decode_board(FrameDecoder& decoder, std::span<const std::byte> bytes,
+std::vector<BoardFrame> decode_board(BoardDecoder& decoder, std::span<const std::byte> bytes,
                                      std::size_t piece) {
   std::vector<BoardFrame> frames;
   for (std::size_t at = 0; at < bytes.size(); at += piece) {
     decoder.push(bytes.subspan(at, std::min(piece, bytes.size() - at)),
-                 [&](const BoardFrame& frame, std::uint64_t) { frames.push_back(frame); });
+                 [&](const DecodedFrame&) { frames.push_back(decoder.frame()); });
   }
   return frames;
 }
@@ -93,18 +93,18 @@ TEST(JumpDetector, FlagsAFlippedHighBitOnceAndAcceptsALastingChange) {
   EXPECT_EQ(flagged, 3);
 }
 
-TEST(FrameDecoder, PiecesOfAnySizeGiveTheSameFrames) {
+TEST(BoardDecoder, PiecesOfAnySizeGiveTheSameFrames) {
   const DamagedStream stream = damaged_stream(200, 0, 0);
   for (const std::size_t piece : {1U, 7U, 163U, 164U, 165U, 4096U}) {
-    FrameDecoder decoder;
+    BoardDecoder decoder;
     EXPECT_EQ(decode_board(decoder, stream.bytes, piece), stream.sent) << "pieces of " << piece;
     EXPECT_EQ(decoder.counters().discarded_bytes, 0U);
   }
 }
 
-TEST(FrameDecoder, RecoversEveryUndamagedFrameAtAThousandthDroppedBytes) {
+TEST(BoardDecoder, RecoversEveryUndamagedFrameAtAThousandthDroppedBytes) {
   const DamagedStream stream = damaged_stream(20000, 1e-3, 0);
-  FrameDecoder decoder;
+  BoardDecoder decoder;
   const std::vector<BoardFrame> got = decode_board(decoder, stream.bytes, 164);
   std::size_t found = 0;
   for (const BoardFrame& frame : got) found += found < stream.intact.size() && frame == stream.intact[found];
@@ -115,9 +115,9 @@ TEST(FrameDecoder, RecoversEveryUndamagedFrameAtAThousandthDroppedBytes) {
   EXPECT_LT(stream.intact.size(), 18000U) << "the faults were not injected";
 }
 
-TEST(FrameDecoder, AcceptsHardlyAnyWrongFrameUnderMixedFaults) {
+TEST(BoardDecoder, AcceptsHardlyAnyWrongFrameUnderMixedFaults) {
   const DamagedStream stream = damaged_stream(20000, 1e-3, 1e-3);
-  FrameDecoder decoder;
+  BoardDecoder decoder;
   const std::vector<BoardFrame> got = decode_board(decoder, stream.bytes, 1000);
   std::size_t next = 0, wrong = 0;
   for (const BoardFrame& frame : got) {

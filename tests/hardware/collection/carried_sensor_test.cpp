@@ -48,7 +48,7 @@ class TextPort : public Port {
       if (!more) break;
       time_s_ = next_.time_s;
       decoder_.push(std::span(raw_).first(std::exchange(next_.count, 0)),
-                    [this](const BoardFrame& frame, std::uint64_t) { take(frame); });
+                    [this](const DecodedFrame&) { take(decoder_.frame()); });
       if (!held_.empty()) until = time_s_;
     }
     const std::size_t count = std::min(buffer.size(), held_.size());
@@ -71,7 +71,7 @@ class TextPort : public Port {
   std::unique_ptr<Port> board_;
   const NumberedBoard& numbers_;
   Sensor sensor_;
-  FrameDecoder decoder_;
+  BoardDecoder decoder_;
   std::array<std::byte, 8192> raw_{};
   Received next_;  // read, and not yet handed on
   std::string held_;
