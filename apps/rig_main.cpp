@@ -5,7 +5,7 @@
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/signals.h"
 #include "data/simulation/simulator.h"
-#include "hardware/virtual_rig/pty_rig.h"
+#include "hardware/virtual_rig/virtual_rig.h"
 
 namespace supertac {
 namespace {

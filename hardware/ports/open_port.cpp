@@ -15,7 +15,6 @@
 
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
-#include "hardware/ports/serial_termios.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 

@@ -15,7 +15,6 @@
 #include <fstream>
 
 #include "hardware/ports/errors.h"
-#include "hardware/ports/serial_termios.h"
 #include "io/numbers/clock.h"
 
 namespace supertac {

@@ -50,6 +50,18 @@ class SerialPort : public Port {
   int descriptor_ = -1;
 };
 
+// Raw terminal settings through TCSETS2, which takes any baud rate (the board's 7,372,800 has no B constant).
+// In serial_termios.cpp, because <asm/termbits.h> and <termios.h> cannot be included together.
+
+constexpr unsigned kLeastBaud = 50, kMostBaud = 100'000'000;
+
+/// Eight bits, no parity, no flow control, no translation, `baud` in both directions.
+/// Returns 0 or the errno of the call that failed.
+int set_raw_terminal(int descriptor, unsigned baud);
+
+/// Baud rate as the terminal reports it, 0 when it does not.
+unsigned terminal_baud(int descriptor);
+
 struct PortInfo {
   std::string path;     ///< /dev/ttyACM0
   std::string usb_id;   ///< "0483:5740", empty when not USB

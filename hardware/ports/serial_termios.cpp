@@ -1,4 +1,4 @@
-#include "hardware/ports/serial_termios.h"
+#include "hardware/ports/serial_port.h"
 
 #include <asm/termbits.h>
 #include <errno.h>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "hardware/ports/serial_termios.h"
+#include "hardware/ports/serial_port.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
 

@@ -11,8 +11,7 @@
 #include <thread>
 
 #include "hardware/ports/errors.h"
-#include "hardware/ports/serial_termios.h"
-#include "hardware/virtual_rig/pty_rig.h"
+#include "hardware/virtual_rig/virtual_rig.h"
 #include "tests/hardware/rig_support.h"
 #include "tests/support/test.h"
 

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "hardware/virtual_rig/pty_rig.h"
+#include "hardware/virtual_rig/virtual_rig.h"
 #include "tests/hardware/virtual_rig/virtual_board.h"
 #include "tests/hardware/virtual_rig/virtual_printer.h"
 
