@@ -228,9 +228,9 @@ RecorderReport collect(const Arguments& arguments, std::unique_ptr<Port> board, 
   }
 }
 
-/// Recordings, quality report and --json of what was collected, complete or not. Returns what it comes to.
-std::string keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
-                        const PalpationOutcome& outcome) {
+/// Recordings, quality report and --json of what was collected, complete or not.
+PassesReport keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
+                         const PalpationOutcome& outcome) {
   OutputFolder folder(arguments.output("out"));
   PassesReport report = write_passes(arguments, journal, out, folder);
   report.json["passes_done"] = outcome.passes_done;
@@ -243,7 +243,7 @@ std::string keep_passes(const Arguments& arguments, const std::string& journal, 
     report.json["journal"] = nullptr;
   }
   arguments.write_json(report.json);
-  return report.total();
+  return report;
 }
 
 /// Where the disk is full, what ended the run would be lost behind what goes wrong with its recordings.
@@ -280,14 +280,19 @@ int run(Arguments& arguments) {
       collect(arguments, std::move(board), std::move(printer), settings, mark).outcome;
   if (!outcome.complete)
     arguments.note("incomplete after " + std::to_string(outcome.passes_done) + " passes; " + outcome.note);
-  std::string total;
+  PassesReport report;
   try {
-    total = keep_passes(arguments, settings.journal, out, outcome);
+    report = keep_passes(arguments, settings.journal, out, outcome);
   } catch (const std::exception& error) {
     fail_to_keep(error, settings.journal, outcome);
   }
   if (outcome.complete) {
-    arguments.print(std::to_string(outcome.passes_done) + " passes, " + total);
+    const std::string all = std::to_string(outcome.passes_done) + " passes, " + report.total();
+    if (report.undated > 0)
+      throw std::runtime_error(all +
+                               "; collect again on a computer that is less busy, or have the sensor send its "
+                               "own time (\"time\" in its file); the journal is kept");
+    arguments.print(all);
     return kExitOk;
   }
   stop_if_interrupted();

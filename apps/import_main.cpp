@@ -88,6 +88,8 @@ int recover(const Arguments& arguments) {
   const std::string out = arguments.text("out");
   OutputFolder folder(arguments.output("out"));
   const PassesReport report = write_passes(arguments, arguments.text("journal"), out, folder);
+  if (report.undated > 0 && report.frames == 0)
+    throw FileError(arguments.text("journal"), report.total() + "; keep it, and collect again");
   if (report.frames == 0)
     throw FileError(arguments.text("journal"),
                     "holds no frame of a pass, for it was cut off before the first contact; delete it");

@@ -132,6 +132,8 @@ std::string journal_path(const std::string& folder, const std::string& plate, in
 std::string PassesReport::total(const std::string& became) const {
   return std::to_string(frames) + " frames" + became +
          (left_out > 0 ? ", " + std::to_string(left_out) + " left out, their time being uncertain" : "") +
+         (undated > 0 ? ", " + std::to_string(undated) + " passes without a recording, no frame being dated"
+                      : "") +
          (doubtful > 0 ? ", " + std::to_string(doubtful) + " passes with doubtful positions" : "") +
          (resets > 0 ? ", the sensor started anew " + std::to_string(resets) + " times" : "") +
          (damage.empty() ? "" : "; " + damage);
@@ -147,7 +149,10 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
   add_parent_file("journal", journal);
   for (const CollectedPass& pass : collection.passes) {
     report.left_out += pass.left_out;
-    if (pass.time_s.size() < 2) continue;
+    if (pass.time_s.size() < 2) {
+      report.undated += pass.left_out > 0 ? 1 : 0;
+      continue;
+    }
     Recording recording = recording_of(pass, collection, header, report.damage);
     const std::string name = recording_file_name(recording);  // a trial's files are known by its order
     recording.speed_mm_s = named_speed(pass.measured_speed, header.speed);
@@ -178,6 +183,7 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
                  {"board_period_plausible", clock.plausible},
                  {"frames", report.frames},
                  {"left_out", report.left_out},
+                 {"undated_passes", report.undated},
                  {"device_resets", report.resets},
                  {"doubtful_passes", report.doubtful},
                  {"passes", passes}};

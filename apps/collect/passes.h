@@ -18,6 +18,7 @@ std::string journal_path(const std::string& folder, const std::string& plate, in
 struct PassesReport {
   std::size_t frames = 0;    ///< in the recordings
   std::size_t left_out = 0;  ///< frames whose time is uncertain
+  std::size_t undated = 0;   ///< passes without a recording: the time of all their frames is uncertain
   std::size_t doubtful = 0;  ///< passes whose positions may be wrong
   bool complete = false;     ///< the run ended as planned
   std::uint64_t resets = 0;  ///< of the sensor, by its stamps
