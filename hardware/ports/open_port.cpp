@@ -39,12 +39,11 @@ class DescriptorPort : public Port {
   double now() override { return monotonic_seconds(); }
 
   Received read(std::span<std::byte> buffer, double until) override {
-    for (;;) {
+    do {
       const auto wait_ms = std::clamp(std::ceil(1e3 * (until - now())), 0.0, 1e9);
       pollfd entry{descriptor_, POLLIN, 0};
       const int ready = poll(&entry, 1, static_cast<int>(wait_ms));
       if (ready < 0 && errno != EINTR) gone(strerror(errno));
-      if (ready <= 0 && now() >= until) return {0, now()};
       if (ready <= 0) continue;
       // A line's end is added to a datagram, and must fit.
       const bool lines = kind_ == Kind::lines;
@@ -57,12 +56,12 @@ class DescriptorPort : public Port {
         began_ = true;
         return {bytes, now()};
       }
-      if (kind_ == Kind::datagrams) continue;
+      if (kind_ == Kind::datagrams) continue;  // an empty one
       // A FIFO that nobody has opened to write looks as one that has been closed.
       if (kind_ != Kind::fifo || began_) gone("");
-      if (now() >= until) return {0, now()};
       usleep(static_cast<useconds_t>(1e6 * std::clamp(until - now(), 0.0, kReadSlice)));
-    }
+    } while (now() < until);
+    return {0, now()};
   }
 
   double write(std::span<const std::byte>, double) override {

@@ -91,7 +91,7 @@ void MarlinLink::refuse_sensor() const {
 bool MarlinLink::probe(double until) {
   lines_.send("\n" + numbered_line(0, "M110 N0"));
   std::string line;
-  while (lines_.arrival_s() < until && read_line(until, line)) {
+  while (read_line(until, line)) {
     const Reply reply = parse_reply(line);
     if (reply.kind == ReplyKind::fatal) check_alarm(reply);
     refuse_grbl(line);

@@ -46,18 +46,17 @@ bool LinePort::read(double until, std::string& line) {
   constexpr double kWatchInterval = 0.02;  // a fifth of the 0.1 s in which an unplugged board must be noticed
   std::array<std::byte, 4096> buffer{};    // no line is longer
   while (!take(line)) {
+    if (arrival_s_ >= until) return false;  // bytes or lines may come for ever
     if (watch_) watch_();
     const Received got = port_.read(buffer, watch_ ? std::min(until, port_.now() + kWatchInterval) : until);
     const auto bytes = std::span(buffer).first(got.count);
+    if (bytes.empty() && got.time_s >= until) return false;
     if (!bytes.empty()) arrival_s_ = got.time_s;
     bytes_ += bytes.size();
     no_text_ +=
         static_cast<std::size_t>(std::ranges::count_if(bytes, [](std::byte b) { return !is_text(b); }));
-    if (bytes.empty() && got.time_s >= until) return false;
     input_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    if (input_.size() <= buffer.size() || input_.find_first_of("\r\n") != std::string::npos) continue;
-    input_.clear();
-    if (got.time_s >= until) return false;  // bytes come for ever, and no line does
+    if (input_.size() > buffer.size() && input_.find_first_of("\r\n") == std::string::npos) input_.clear();
   }
   return true;
 }
@@ -83,6 +82,21 @@ struct MarlinLink::Exchange {
 };
 
 MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s) {
+  Exchange exchange = exchange_of(code, deadline_s);
+  // Taken is not finished: the ok of a command behind it in the queue tells when a long one has ended.
+  for (int attempt = 0; exchange.proven && deadline_s > kOkDeadline; ++attempt) {
+    if (attempt == kAttempts)
+      throw PrinterSilent("printer " + lines_.name() + ": expected an ok to M400 behind " + in_quotes(code) +
+                          ", found none of " + std::to_string(kAttempts) +
+                          "; check the printer and the cable");
+    const Exchange behind = exchange_of("M400", deadline_s);
+    exchange.answer.answered_s = behind.answer.answered_s;
+    exchange.proven = behind.proven;
+  }
+  return std::move(exchange.answer);
+}
+
+MarlinLink::Exchange MarlinLink::exchange_of(std::string_view code, double deadline_s) {
   if (halted_) throw PrinterHalted("printer " + lines_.name() + ": halted earlier; reset it and start again");
   std::string early;  // what was read before a question is no answer to it
   while (lines_.take(early)) check_alarm(parse_reply(early));
@@ -117,11 +131,7 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
   }
   owed_ = 0;
   finish(exchange);
-  if (exchange.proven && deadline_s > kOkDeadline) {
-    // Taken is not finished: the ok of a command behind it in the queue tells when a long one has ended.
-    exchange.answer.answered_s = command("M400", deadline_s).answered_s;
-  }
-  return std::move(exchange.answer);
+  return exchange;
 }
 
 void MarlinLink::finish(const Exchange& exchange) {
@@ -295,14 +305,14 @@ void MarlinLink::abandon(double seconds) {
 void MarlinLink::idle(double seconds) {
   const double until = lines_.port().now() + seconds;
   std::string line;
-  while (lines_.arrival_s() < until && read_line(until, line)) check_alarm(parse_reply(line));
+  while (read_line(until, line)) check_alarm(parse_reply(line));
 }
 
 void MarlinLink::settle() {
   const double limit = lines_.port().now() + 2;
   std::string line;
   double quiet_until = lines_.port().now() + kQuiet;
-  while (lines_.arrival_s() < limit && read_line(std::min(quiet_until, limit), line)) {
+  while (read_line(std::min(quiet_until, limit), line)) {
     const Reply reply = parse_reply(line);
     heed(reply);
     // Reports come for ever; what is waited for is the end of answers.

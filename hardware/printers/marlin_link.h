@@ -29,8 +29,8 @@ class LinePort {
 
   /// Returns the port's time (s) before the write. Throws as Port::write().
   double send(const std::string& text);
-  /// The next line that is not empty, without its break and trailing blanks; false when `until` passes first.
-  /// Throws as Port::read().
+  /// The next line that is not empty, without its break and trailing blanks; false when `until` (s, on the
+  /// port's clock) passes first, also where bytes or lines come for ever. Throws as Port::read().
   bool read(double until, std::string& line);
   /// The same of what has been received already.
   bool take(std::string& line);
@@ -129,6 +129,7 @@ class MarlinLink {
  private:
   struct Exchange;
 
+  Exchange exchange_of(std::string_view code, double deadline_s);
   bool probe(double until);
   [[noreturn]] void nobody_answered();
   [[noreturn]] void refuse(const std::string& firmware, const std::string& why) const;

@@ -182,6 +182,20 @@ TEST(SensorReader, ADatagramOfTextIsALine) {
   close(out);
 }
 
+// A datagram of nothing is none, and does not prolong the wait.
+TEST(OpenPort, EmptyDatagramsAreNotReadBeyondTheDeadline) {
+  const int port = free_port(SOCK_DGRAM);
+  const OpenedPort opened = open_port("udp::" + std::to_string(port));
+  const int out = socket(AF_INET, SOCK_DGRAM, 0);
+  const sockaddr_in to = at_port(port);
+  for (const char* bytes : {"", "", "x"})
+    sendto(out, bytes, std::strlen(bytes), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+  close(out);
+  std::array<std::byte, 16> buffer{};
+  EXPECT_EQ(opened.port->read(buffer, 0).count, 0U);
+  EXPECT_EQ(opened.port->read(buffer, opened.port->now() + 10).count, 1U);
+}
+
 TEST(SensorReader, ReadsTcpUntilTheOtherSideIsGone) {
   const Sensor sensor = mat(2, 2, 100, R"({"kind":"json"})");
   const int port = free_port(SOCK_STREAM), server = socket(AF_INET, SOCK_STREAM, 0);

@@ -227,16 +227,40 @@ TEST(MarlinLink, APrinterThatAsksForLineOneForEverIsAResendLoop) {
 }
 
 TEST(MarlinLink, AnswersWithoutProgressEnd) {
-  for (const std::string answer : {"echo:busy: processing", "T:25.0"}) {
-    ScriptedPrinter talker(connects, answer + "\n");
+  for (const auto& [answer, says] :
+       {std::pair("echo:busy: processing", "within 60 s, found other answers ('echo:busy: processing' last)"),
+        {"T:25.0", "line 1 repeated 8 times without success (no answer)"}}) {
+    ScriptedPrinter talker(connects, std::string(answer) + "\n");
     MarlinLink link(talker);
-    EXPECT_ERROR(link.connect(), PrinterSilent, "within 60 s, found other answers ('" + answer + "' last)");
+    EXPECT_ERROR(link.connect(), PrinterSilent, says);
     EXPECT_LT(talker.now(), 90);
+    using Wait = void (*)(MarlinLink&);
+    for (const Wait wait : {Wait([](MarlinLink& l) { l.idle(1); }), Wait([](MarlinLink& l) { l.settle(); }),
+                            Wait([](MarlinLink& l) { l.abandon(1); })}) {
+      const double begin = talker.now();
+      wait(link);
+      EXPECT_LT(talker.now(), begin + 3.1);
+    }
   }
   ScriptedPrinter stranger([](const std::string&) { return ""; }, "hello\n");
   MarlinLink other(stranger);
   EXPECT_ERROR(other.connect(), WrongDevice, "it said 'hello'");
   EXPECT_LT(stranger.now(), 25);
+}
+
+TEST(MarlinLink, AnEndThatIsNeverAcknowledgedIsNotAwaitedForEver) {
+  std::int64_t last = 0;
+  ScriptedPrinter port([&](const std::string& line) -> std::string {
+    const std::int64_t number = std::stoll(line.substr(1));
+    if (number < 2) return number == 0 ? "ok\n" : "FIRMWARE_NAME:Marlin\nCap:EMERGENCY_PARSER:1\nok\n";
+    if (number < last + 500) return last = number, "";
+    return "Error:Line Number is not Last Line Number+1, Last Line: " + std::to_string(last) + "\nok\n";
+  });
+  MarlinLink link(port);
+  link.connect();
+  EXPECT_ERROR(link.command("G28", 10), PrinterSilent,
+               "expected an ok to M400 behind 'G28', found none of 6");
+  EXPECT_LT(port.now(), 100);
 }
 
 TEST(MarlinLink, ASensorAtThePrintersPortIsRecognised) {
@@ -250,7 +274,7 @@ TEST(MarlinLink, ASensorAtThePrintersPortIsRecognised) {
   }
   ScriptedPrinter printer(connects, "T:25.0 /0.0 @:0\n12\n");
   MarlinLink link(printer);
-  EXPECT_ERROR(link.connect(), PrinterSilent, "within 60 s") << "half of its lines are words";
+  EXPECT_ERROR(link.connect(), PrinterSilent, "no answer") << "half of its lines are words";
 }
 
 TEST(MarlinLink, ARunHasABoundOfItsOwn) {
