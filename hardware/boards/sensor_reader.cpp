@@ -157,11 +157,6 @@ void SensorReader::check() {
   if (error_) std::rethrow_exception(error_);
 }
 
-void SensorReader::wait_for_end(double wait_s) {
-  std::unique_lock lock(mutex_);
-  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return ended_; });
-}
-
 bool SensorReader::ended() const {
   const std::lock_guard lock(mutex_);
   return ended_ && queue_.empty() && !error_;

@@ -100,8 +100,6 @@ class SensorReader {
   std::optional<ReadFrame> next(double wait_s);
   /// Rethrows what ended the reader, without waiting and without taking frames.
   void check();
-  /// Waits at most `wait_s` of wall time for the reader to end by itself.
-  void wait_for_end(double wait_s);
   /// The source is at its end and all frames have been taken.
   bool ended() const;
   bool live() const { return live_; }

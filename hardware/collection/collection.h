@@ -11,10 +11,65 @@
 #include "data/frames/sensor_decoder.h"
 #include "data/sensors/sensor.h"
 #include "hardware/collection/journal.h"
-#include "hardware/collection/position_track.h"
 #include "hardware/printers/palpation.h"
 
 namespace supertac {
+
+// Where the head was during a pass, and how fast: fitted to what the printer measured, never to what was
+// ordered. The order says where a leg begins and ends; speed and times are the machine's.
+
+/// How the moves of a run took their time where the firmware has no M114 R, measured by the run itself with
+/// short moves at the slide's speed v and at a slow one. A move of length L at speed v ends delay + L / v +
+/// ramps(v) after the firmware's ok. Two speeds tell the delay from the ramps but for what lies between ramps
+/// in proportion to v (an acceleration) and none at the slow speed (a jerk): `range_s`.
+struct MoveTiming {
+  double delay_s = 0;         ///< of the start
+  double acceleration = 500;  ///< mm/s^2, of ramps that take the measured time
+  double slowness = 1;        ///< of slides; measured from three on and within 2 %
+  double spread_s = 0;        ///< how far the measurements lie apart
+  double range_s = 0;  ///< by which delay_s may be wrong, the ramps then being so much shorter or longer
+  double faster = 1;   ///< than ordered, at most, by the positions of any leg
+};
+/// From the short moves in the air that Palpation makes; in their absence from all legs, as if at 500 mm/s^2.
+MoveTiming timing_of(std::span<const Leg> ended);
+/// Of the leg's middle part (mm/s), by its positions; 0: too few.
+double fitted_speed(const Leg& leg, const std::vector<PositionSample>& samples);
+
+/// Where the head was, from the polled positions of one pass. The speed of a leg is the median of its
+/// samples' own. Then the longest chain of samples is kept in which each can be reached from the one before
+/// at this speed, or the run's fastest; the others were damaged, late, or misdated while the host stood
+/// still. Between samples the position is linear in time.
+class PositionTrack {
+ public:
+  /// Adds a leg's samples; without samples the leg is modelled as a trapezoid of speed that begins by
+  /// `timing` and ends when M400 was answered.
+  void add_leg(const Leg& leg, const std::vector<PositionSample>& samples, const MoveTiming& timing);
+  struct Knot {
+    double time_s;
+    Point3 position;
+    double doubt_mm = 0;  ///< how far the head may have been from there, and on the way to it
+  };
+  Knot at(double time_s) const;
+  double begin() const { return points_.empty() ? 0 : points_.front().time_s; }
+  double end() const { return points_.empty() ? 0 : points_.back().time_s; }
+  std::uint64_t rejected() const { return rejected_; }
+  /// Of the slide, as measured (mm/s); 0: nothing tells.
+  double speed() const { return speed_; }
+  /// Why, and by how much, at() or speed() may be wrong; each ends with "; ". Empty: by less than
+  /// `trusted_mm`.
+  std::string doubt(double trusted_mm) const;
+
+ private:
+  void add(double time_s, const Point3& position);
+  void model(const Leg& leg, const MoveTiming& timing);
+  void distrust(double fastest, const PositionSample& before, const PositionSample& after);
+  std::vector<Knot> points_;
+  std::uint64_t rejected_ = 0;
+  double speed_ = 0;
+  double doubt_mm_ = 0;    // how far at() may be from the head
+  double misfits_ = 0;     // the largest share of a leg's samples that fit no way of the head
+  double unevenness_ = 0;  // of the slide's speed, relative
+};
 
 /// What the recorder writes as events, and the converter reads back.
 std::string event_text(const Leg& leg, bool ended);

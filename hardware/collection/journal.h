@@ -96,8 +96,8 @@ Journal read_journal(const std::string& path);
 Journal parse_journal(std::span<const std::byte> bytes, const std::string& name);
 
 // Raw capture and replay. A captured port writes everything that passes, with its times, to a journal; a
-// replayed port gives the same bytes at the same times to the same drivers, which then do exactly the same
-// again.
+// replayed port gives the same bytes at the same times to a sensor's reader, which then gives the same
+// frames.
 
 class CapturedPort : public Port {
  public:
@@ -117,7 +117,7 @@ class CapturedPort : public Port {
 
 class ReplayPort : public Port {
  public:
-  /// Throws PortEnded at the end of the records, ReplayDiverged when the driver does something else than
+  /// Throws PortEnded at the end of the records, ReplayDiverged when the reader does something else than
   /// was recorded, JournalError when it does because of the damage to the journal, `lost_bytes`.
   ReplayPort(std::vector<JournalRecord> records, std::string name, std::uint64_t lost_bytes = 0);
   const std::string& name() const override { return name_; }

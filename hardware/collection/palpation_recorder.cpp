@@ -29,19 +29,18 @@ PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& 
   };
   observer.check = [&] {
     check_stop(settings, journal);
-    if (!settings.replay) board.check();
+    board.check();
   };
   observer.contact = settings.contact;
   return observer;
 }
 
 // Nothing moves before the board has been heard: a wrong port would otherwise be found with the finger on its
-// way. The wait is a fixed one, so that a replay waits the same.
+// way.
 void hear_board(SensorReader& board, Printer& printer, const RecorderSettings& settings,
                 JournalWriter& journal) {
   const double silence_s = settings.reader.silence_s;
   printer.link().idle(0.1 + (silence_s > 0 ? silence_s : SensorReader::silence_s(settings.sensor)));
-  if (settings.replay) return;
   for (int i = 0; i < 100 && !board.next(0.02); ++i) check_stop(settings, journal);  // throws what ended it
 }
 
@@ -51,7 +50,6 @@ RecorderReport record(SensorReader& board, Printer& printer, const RecorderSetti
   RecorderReport report;
   report.outcome = Palpation(printer, settings.bed.plan, observer_for(settings, journal, board)).run();
   report.kept = printer.put_back();
-  if (settings.replay) board.wait_for_end(60);
   board.stop();
   report.printer = printer.link().counters();
   if (report.outcome.complete) journal.event(printer.link().port().now(), kRunComplete);

@@ -24,8 +24,6 @@ struct RecorderSettings {
   std::function<bool()> stop = [] { return false; };
   /// Called with true before the finger may touch, with false when it no longer can.
   std::function<void(bool)> contact = [](bool) {};
-  /// The ports replay a journal: the board's is read to its end, which is no error.
-  bool replay = false;
   /// Called for every polled position; for a live line.
   std::function<void(const Leg&, const Point3&, const ReaderCounters&)> progress;
 };

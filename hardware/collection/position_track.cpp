@@ -1,9 +1,8 @@
-#include "hardware/collection/position_track.h"
-
+// The head's way through a pass, by its positions or by how long its moves took.
 #include <algorithm>
 #include <cmath>
 
-#include "hardware/printers/printer.h"
+#include "hardware/collection/collection.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 

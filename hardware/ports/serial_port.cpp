@@ -1,12 +1,12 @@
 #include "hardware/ports/serial_port.h"
 
+#include <asm/termbits.h>  // has any baud rate; <termios.h> cannot be included beside it
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
-#include <termios.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -60,6 +60,22 @@ void raise_modem_lines(int descriptor) {
 
 }  // namespace
 
+int set_raw_terminal(int descriptor, unsigned baud) {
+  termios2 settings{};
+  if (ioctl(descriptor, TCGETS2, &settings) != 0) return errno;
+  settings.c_iflag = settings.c_oflag = settings.c_lflag = 0;
+  settings.c_cflag = CS8 | CREAD | CLOCAL | BOTHER | (BOTHER << IBSHIFT);
+  settings.c_ispeed = settings.c_ospeed = baud;
+  settings.c_cc[VMIN] = 1;  // so that an empty port is EAGAIN and read 0 only ever means end of file
+  settings.c_cc[VTIME] = 0;
+  return ioctl(descriptor, TCSETS2, &settings) == 0 ? 0 : errno;
+}
+
+unsigned terminal_baud(int descriptor) {
+  termios2 settings{};
+  return ioctl(descriptor, TCGETS2, &settings) == 0 ? settings.c_ospeed : 0;
+}
+
 double monotonic_seconds() { return seconds_of(CLOCK_MONOTONIC); }
 
 SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
@@ -87,7 +103,7 @@ SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
   }
   raise_modem_lines(descriptor_);
   // What waited until somebody opened the port is old, and would be dated as if it came now.
-  if (tcflush(descriptor_, TCIFLUSH) != 0) give_up(errno);
+  if (ioctl(descriptor_, TCFLSH, TCIFLUSH) != 0) give_up(errno);
 }
 
 SerialPort::~SerialPort() {

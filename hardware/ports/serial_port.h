@@ -51,7 +51,6 @@ class SerialPort : public Port {
 };
 
 // Raw terminal settings through TCSETS2, which takes any baud rate (the board's 7,372,800 has no B constant).
-// In serial_termios.cpp, because <asm/termbits.h> and <termios.h> cannot be included together.
 
 constexpr unsigned kLeastBaud = 50, kMostBaud = 100'000'000;
 

@@ -63,11 +63,6 @@ Point3 MotionQueue::at(double t) {
   return between(block.from, block.to, length > 0 ? done / length : 1);
 }
 
-bool MotionQueue::full(double t) {
-  (void)at(t);
-  return blocks_.size() >= kBlocks;
-}
-
 void MotionQueue::move_to(const Point3& to, double speed_mm_s, double t) {
   rest_ = blocks_.empty() ? at(t) : rest_;
   const Point3 from = target();
@@ -84,19 +79,6 @@ void MotionQueue::home(double t) {
   move_to({at.x, at.y, at.z + 5}, rig::kLiftMmS, t);
   move_to({0, 0, at.z + 5}, rig::kFastestMmS, t);
   move_to({}, rig::kLiftMmS, t);
-}
-
-void MotionQueue::hold(double t, double seconds) {
-  rest_ = at(t);
-  if (blocks_.empty()) return;
-  for (Block& block : blocks_) {
-    block.start += seconds;
-    block.end += seconds;
-  }
-  end_ += seconds;
-  Block& running = blocks_.front();
-  if (running.start - seconds >= t) return;
-  running = {rest_, running.to, t + seconds, running.end};
 }
 
 Point3 MotionQueue::stop(double t) {

@@ -24,8 +24,6 @@ namespace supertac {
 /// A move that finds the queue empty starts late.
 class MotionQueue {
  public:
-  static constexpr std::size_t kBlocks = 16;
-
   /// `slowness`: moves take this many times as long.
   MotionQueue(const Point3& start, double start_delay_s, double slowness, double acceleration)
       : rest_(start), start_delay_s_(start_delay_s), slowness_(slowness), acceleration_(acceleration) {}
@@ -36,19 +34,14 @@ class MotionQueue {
   Point3 target() const { return blocks_.empty() ? rest_ : blocks_.back().to; }
   /// When the last move ends; in the past when the head stands.
   double end_time() const { return end_; }
-  /// When the move now running ends; end_time() when none runs.
-  double next_end() const { return blocks_.empty() ? end_ : blocks_.front().end; }
-  bool full(double t);
   /// At this speed, or as fast as z goes.
   void move_to(const Point3& to, double speed_mm_s, double t);
   /// Up, across, and down to 0, 0, 0.
   void home(double t);
-  /// Stands for so long, then goes on.
-  void hold(double t, double seconds);
   /// Stops dead; returns where.
   Point3 stop(double t);
 
- private:
+ protected:
   struct Block {
     Point3 from, to;
     double start, end;

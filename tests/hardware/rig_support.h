@@ -14,6 +14,7 @@
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/printers/printer.h"
 #include "io/numbers/random.h"
+#include "tests/hardware/fake_port.h"
 #include "tests/hardware/simulated_rig.h"
 #include "tests/support/test.h"
 
@@ -39,27 +40,21 @@ inline RigSettings running_rig(const VirtualPrinterSettings& printer = {}, const
 }
 
 /// Damages the bytes from or to the printer once: the first occurrence of `find` becomes `replace`.
-class Tampering : public Port {
+class Tampering : public WrappedPort {
  public:
-  explicit Tampering(std::unique_ptr<Port> inner) : inner_(std::move(inner)) {}
-  const std::string& name() const override { return inner_->name(); }
-  double now() override { return inner_->now(); }
+  using WrappedPort::WrappedPort;
   Received read(std::span<std::byte> buffer, double until) override {
-    if (held_.empty()) {
+    if (said_.empty()) {
       std::array<std::byte, 1024> raw{};
       const Received got = inner_->read(raw, until);
-      if (got.count == 0) return got;
-      held_.assign(reinterpret_cast<const char*>(raw.data()), got.count);
-      tamper(held_, from_printer);
-      time_ = got.time_s;
+      said_ = as_text(std::span(raw).first(got.count));
+      tamper(said_, from_printer);
+      now_ = got.time_s;
     }
-    const std::size_t count = std::min(buffer.size(), held_.size());
-    std::copy_n(std::as_bytes(std::span(held_)).begin(), count, buffer.begin());
-    held_.erase(0, count);
-    return {count, time_};
+    return hand_on(buffer);
   }
   double write(std::span<const std::byte> bytes, double until) override {
-    std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    std::string text = as_text(bytes);
     tamper(text, to_printer);
     return inner_->write(std::as_bytes(std::span(text)), until);
   }
@@ -74,9 +69,6 @@ class Tampering : public Port {
     text.replace(at, changes.front().first.size(), changes.front().second);
     changes.erase(changes.begin());
   }
-  std::unique_ptr<Port> inner_;
-  std::string held_;
-  double time_ = 0;
 };
 
 /// Motion commands among those that ran.
@@ -86,14 +78,6 @@ inline std::vector<std::string> moves_of(const VirtualPrinter& printer) {
     if (executed.command.starts_with("G1")) moves.push_back(executed.command);
   }
   return moves;
-}
-
-/// The run of a journal again.
-inline RecorderReport replayed(const Journal& journal, RecorderSettings settings) {
-  settings.replay = true;
-  return record_palpation(std::make_unique<ReplayPort>(journal.of(JournalStream::board), "board"),
-                          std::make_unique<ReplayPort>(journal.of(JournalStream::printer), "printer"),
-                          settings);
 }
 
 /// A connected driver on a simulated rig, and where the head really is. `damaged`: of the printer's answers.

@@ -6,6 +6,7 @@
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
 #include "hardware/printers/marlin_link.h"
+#include "tests/hardware/fake_port.h"
 #include "tests/hardware/rig_support.h"
 #include "tests/hardware/virtual_rig/rig_world.h"
 #include "tests/support/test.h"
@@ -63,14 +64,13 @@ TEST(RigBoard, ASlowConsumerLosesTheOldestAndIsTold) {
 }
 
 // Bytes handed over in reads of the given sizes, at the given times.
-class ScriptedPort : public Port {
+class ScriptedPort : public FakePort {
  public:
   struct Read {
     double time_s;
     std::vector<std::byte> bytes;
   };
   explicit ScriptedPort(std::vector<Read> reads) : reads_(std::move(reads)) {}
-  const std::string& name() const override { return name_; }
   double now() override { return at_ < reads_.size() ? reads_[at_].time_s : 1e9; }
   Received read(std::span<std::byte> buffer, double) override {
     if (at_ == reads_.size()) throw PortUnplugged("script: the end");
@@ -78,10 +78,8 @@ class ScriptedPort : public Port {
     std::copy(read.bytes.begin(), read.bytes.end(), buffer.begin());
     return {read.bytes.size(), read.time_s};
   }
-  double write(std::span<const std::byte>, double) override { return now(); }
 
  private:
-  std::string name_ = "script";
   std::vector<Read> reads_;
   std::size_t at_ = 0;
 };

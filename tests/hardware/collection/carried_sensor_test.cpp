@@ -31,30 +31,24 @@ Sensor mat(bool stamped) {
 
 /// Frame n of the board, of every ten, as a line of `sensor`: sent half a period later, by a clock that is
 /// fast by three thousandths.
-class TextPort : public Port {
+class TextPort : public WrappedPort {
  public:
   TextPort(std::unique_ptr<Port> board, const NumberedBoard& numbers, Sensor sensor)
-      : board_(std::move(board)), numbers_(numbers), sensor_(std::move(sensor)) {}
-  const std::string& name() const override { return board_->name(); }
-  double now() override { return board_->now(); }
-  double write(std::span<const std::byte>, double) override { return now(); }
+      : WrappedPort(std::move(board)), numbers_(numbers), sensor_(std::move(sensor)) {}
   Received read(std::span<std::byte> buffer, double until) override {
-    constexpr double kAtOnceS =
-        4e-4;  // what waited while the host stood still: a terminal hands it on at once
-    for (bool more = held_.empty(); more;) {
-      if (next_.count == 0) next_ = board_->read(raw_, until);
-      if (next_.count == 0 && held_.empty()) return next_;
-      more = next_.count > 0 && (held_.empty() || next_.time_s - time_s_ < kAtOnceS);
+    // What waited while the host stood still: a terminal hands it on at once.
+    constexpr double kAtOnceS = 4e-4;
+    for (bool more = said_.empty(); more;) {
+      if (next_.count == 0) next_ = inner_->read(raw_, until);
+      if (next_.count == 0 && said_.empty()) return next_;
+      more = next_.count > 0 && (said_.empty() || next_.time_s - now_ < kAtOnceS);
       if (!more) break;
-      time_s_ = next_.time_s;
+      now_ = next_.time_s;
       decoder_.push(std::span(raw_).first(std::exchange(next_.count, 0)),
                     [this](const DecodedFrame&) { take(decoder_.frame()); });
-      if (!held_.empty()) until = time_s_;
+      if (!said_.empty()) until = now_;
     }
-    const std::size_t count = std::min(buffer.size(), held_.size());
-    std::copy_n(std::as_bytes(std::span(held_)).begin(), count, buffer.begin());
-    held_.erase(0, count);
-    return {count, time_s_};
+    return hand_on(buffer);
   }
 
  private:
@@ -65,17 +59,14 @@ class TextPort : public Port {
     const std::uint64_t number = sent_ * kEvery - kEvery / 2;
     std::vector<double> values(64, 100);
     values[0] = static_cast<double>(number % 1000), values[1] = static_cast<double>(number / 1000);
-    held_ += sent_frame(sensor_, values, 1.003 * static_cast<double>(sent_) * kEvery * rig::kFramePeriodS);
+    said_ += sent_frame(sensor_, values, 1.003 * static_cast<double>(sent_) * kEvery * rig::kFramePeriodS);
   }
 
-  std::unique_ptr<Port> board_;
   const NumberedBoard& numbers_;
   Sensor sensor_;
   BoardDecoder decoder_;
   std::array<std::byte, 8192> raw_{};
   Received next_;  // read, and not yet handed on
-  std::string held_;
-  double time_s_ = 0;
   std::uint64_t sent_ = 0;
 };
 
@@ -191,19 +182,6 @@ TEST(CarriedSensor, AHostThatStandsStillMakesNothingWrongInSilence) {
     }
     EXPECT_GT(frames, 700U);
   }
-}
-
-TEST(CarriedSensor, AReplayGivesTheSameFrames) {
-  CarriedSensor run(mat(false));
-  (void)run.record();
-  const Journal journal = run.journal();
-  run.settings.journal = run.folder / "replayed";
-  const RecorderReport second = replayed(journal, run.settings);
-  EXPECT_TRUE(second.outcome.complete) << second.outcome.note;
-  const CollectedPass a = collection_of(journal).passes.at(0), b = collection_of(run.journal()).passes.at(0);
-  EXPECT_EQ(a.time_s, b.time_s);
-  EXPECT_EQ(a.signals, b.signals);
-  EXPECT_EQ(a.position, b.position);
 }
 
 TEST(CarriedSensor, ADamagedJournalCostsItsOwnFramesOnly) {

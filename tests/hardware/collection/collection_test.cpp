@@ -16,39 +16,11 @@ struct CollectionBench {
     settings.reader.queue_frames = 16;  // nobody looks at the live frames here
   }
   RecorderReport record() { return record_palpation(rig.board_port(), rig.printer_port(), settings); }
-  Collection collect() { return collection_of(read_journal(settings.journal)); }
 
   TemporaryFolder folder;
   SimulatedRig rig;
   RecorderSettings settings;
 };
-
-TEST(Collection, AReplayGivesTheSameFramesAndTheSameRun) {
-  CollectionBench bench(running_rig({}, {.byte_rate = 0.001, .lost_frame_rate = 0.01}));
-  bench.settings.bed.plan.passes = 1;
-  const RecorderReport first = bench.record();
-  const Journal journal = read_journal(bench.settings.journal);
-  bench.settings.journal = bench.folder / "replayed";
-  const RecorderReport second = replayed(journal, bench.settings);
-  EXPECT_EQ(second.outcome.complete, first.outcome.complete);
-  EXPECT_EQ(second.printer.repeats, first.printer.repeats);
-  const Collection a = collection_of(journal), b = bench.collect();
-  ASSERT_EQ(a.passes.size(), b.passes.size());
-  EXPECT_EQ(a.passes[0].time_s, b.passes[0].time_s);
-  EXPECT_EQ(a.passes[0].signals, b.passes[0].signals);
-  EXPECT_EQ(a.passes[0].position, b.passes[0].position);
-  EXPECT_GT(a.passes[0].time_s.size(), 9000U);
-}
-
-TEST(Collection, AReplayWithAnotherPlanIsRefused) {
-  CollectionBench bench(running_rig());
-  bench.settings.bed.plan.passes = 1;
-  bench.record();
-  const Journal journal = read_journal(bench.settings.journal);
-  bench.settings.journal = bench.folder / "replayed";
-  bench.settings.bed.plan.speed = 5;
-  EXPECT_FALSE(replayed(journal, bench.settings).outcome.complete);
-}
 
 TEST(Collection, NothingMovesBeforeTheBoardIsHeard) {
   CollectionBench bench(running_rig({}, {.lost_frame_rate = 1}));

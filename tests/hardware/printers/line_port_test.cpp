@@ -1,27 +1,26 @@
 #include "hardware/printers/marlin_link.h"
 
+#include "tests/hardware/fake_port.h"
 #include "tests/support/test.h"
 
 namespace supertac::line_port_test {
 
 /// Says `text` over and over, `most` bytes at once and every `every_s` seconds.
-class Talker : public Port {
+class Talker : public FakePort {
  public:
-  explicit Talker(std::string text, std::size_t most = 100, double every_s = 0.001)
-      : text_(std::move(text)), most_(most), every_s_(every_s) {}
-  const std::string& name() const override { return text_; }
-  double now() override { return now_; }
-  Received read(std::span<std::byte> buffer, double) override {
-    const std::size_t count = std::min(most_, buffer.size());
-    for (std::size_t i = 0; i < count; ++i) buffer[i] = static_cast<std::byte>(text_[at_++ % text_.size()]);
-    return {count, now_ += every_s_};
+  explicit Talker(const std::string& text, std::size_t most = 100, double every_s = 0.001)
+      : most_(most), every_s_(every_s) {
+    name_ = text;
   }
-  double write(std::span<const std::byte>, double) override { return now_; }
+  Received read(std::span<std::byte> buffer, double) override {
+    for (std::size_t i = 0; i < most_; ++i) said_ += name_[at_++ % name_.size()];
+    now_ += every_s_;
+    return hand_on(buffer);
+  }
 
  private:
-  std::string text_;
   std::size_t most_, at_ = 0;
-  double every_s_, now_ = 0;
+  double every_s_;
 };
 
 TEST(LinePort, EndsInTimeWhateverComesForEver) {

@@ -1,5 +1,6 @@
 #include "hardware/printers/marlin_link.h"
 
+#include "tests/hardware/fake_port.h"
 #include "tests/hardware/rig_support.h"
 #include "tests/support/test.h"
 
@@ -179,26 +180,21 @@ TEST(MarlinLink, ARefusedCommandIsNotSentForEver) {
 }
 
 /// A device that answers every line by a rule of its own, in a time that passes while it is read.
-class ScriptedPrinter : public Port {
+class ScriptedPrinter : public FakePort {
  public:
   using Answer = std::function<std::string(const std::string& line)>;
   explicit ScriptedPrinter(Answer answer, std::string always = {})
       : answer_(std::move(answer)), always_(std::move(always)) {}
-  const std::string& name() const override { return name_; }
-  double now() override { return now_; }
   Received read(std::span<std::byte> buffer, double until) override {
-    now_ += always_.empty() && waiting_.empty() ? std::max(0.0, until - now_) : 0.01;
-    waiting_ += always_;
-    const std::size_t count = std::min(buffer.size(), waiting_.size());
-    std::copy_n(std::as_bytes(std::span(waiting_)).begin(), count, buffer.begin());
-    waiting_.erase(0, count);
-    return {count, now_};
+    now_ += always_.empty() && said_.empty() ? std::max(0.0, until - now_) : 0.01;
+    said_ += always_;
+    return hand_on(buffer);
   }
   double write(std::span<const std::byte> bytes, double) override {
-    const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const std::string text = as_text(bytes);
     for (std::size_t at = 0; at < text.size();) {
       const std::size_t end = std::min(text.find('\n', at), text.size());
-      if (end > at) waiting_ += answer_(text.substr(at, end - at));
+      if (end > at) said_ += answer_(text.substr(at, end - at));
       at = end + 1;
     }
     ++writes_;
@@ -208,8 +204,7 @@ class ScriptedPrinter : public Port {
 
  private:
   Answer answer_;
-  std::string name_ = "script", waiting_, always_;
-  double now_ = 0;
+  std::string always_;
   int writes_ = 0;
 };
 

@@ -26,7 +26,15 @@ struct RigFaults {
 
   /// The mix of `--faults RATE`: bytes at `rate`, every other fault scaled so that resets and unplugs stay
   /// rare enough for some collections to finish.
-  static RigFaults mixed(double rate);
+  static RigFaults mixed(double rate) {
+    return {.byte_rate = rate,
+            .lost_ok_rate = rate,
+            .resend_storm_rate = rate / 10,
+            .reset_rate = rate / 200,
+            .unplug_rate = rate / 200,
+            .stall_rate = rate / 10,
+            .lost_frame_rate = rate};
+  }
 };
 
 /// A stream of decisions.
@@ -47,7 +55,28 @@ class Dice {
 class ByteFaults {
  public:
   ByteFaults(double rate, std::uint64_t seed, std::uint64_t stream) : rate_(rate), dice_(seed, stream) {}
-  std::vector<std::byte> apply(std::span<const std::byte> bytes);
+  std::vector<std::byte> apply(std::span<const std::byte> bytes) {
+    if (!(rate_ > 0)) return {bytes.begin(), bytes.end()};
+    std::vector<std::byte> out;
+    out.reserve(bytes.size() + 8);
+    for (const std::byte byte : bytes) {
+      if (!dice_.hit(rate_)) {
+        out.push_back(byte);
+        continue;
+      }
+      switch (dice_.below(3)) {
+        case 0:
+          break;
+        case 1:
+          out.push_back(byte ^ static_cast<std::byte>(1U << dice_.below(8)));
+          break;
+        default:
+          out.push_back(byte);
+          out.push_back(static_cast<std::byte>(dice_.below(256)));
+      }
+    }
+    return out;
+  }
 
  private:
   double rate_;

@@ -58,6 +58,17 @@ struct VirtualPrinterSettings {
   std::uint64_t seed = 1;
 };
 
+/// A planner with room for so many moves, which may stand still.
+class FaultyMotion : public MotionQueue {
+ public:
+  using MotionQueue::MotionQueue;
+  bool full(double t) { return (void)at(t), blocks_.size() >= 16; }
+  /// When the move now running ends; end_time() when none runs.
+  double next_end() const { return blocks_.empty() ? end_ : blocks_.front().end; }
+  /// Stands for so long, then goes on.
+  void hold(double t, double seconds);
+};
+
 class VirtualPrinter {
  public:
   /// A command that ran: what it was and when. Tests prove by it that nothing runs twice.
@@ -136,7 +147,7 @@ class VirtualPrinter {
   bool random_trouble(double t);
 
   VirtualPrinterSettings settings_;
-  MotionQueue motion_;
+  FaultyMotion motion_;
   Dice dice_;
   Point3 offset_, base_;  // logical = physical - offset - base; base_: Klipper's own
   LeftOver left_over_;

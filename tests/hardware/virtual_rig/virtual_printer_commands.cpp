@@ -9,11 +9,29 @@
 
 #include "hardware/virtual_rig/virtual_rig.h"
 #include "io/numbers/numbers.h"
-#include "tests/hardware/virtual_rig/marlin_texts.h"
 
 namespace supertac {
+namespace {
 
 constexpr double kInch = 25.4;
+
+// The answer of bugfix-2.0.x to M115: its name, and what it can do.
+std::string marlin_capabilities(bool emergency_parser) {
+  return "FIRMWARE_NAME:Marlin 2.1.2 (virtual rig) SOURCE_CODE_URL:github.com/MarlinFirmware/Marlin "
+         "PROTOCOL_VERSION:1.0 MACHINE_TYPE:3D Printer EXTRUDER_COUNT:1 "
+         "UUID:cede2a2f-41a2-4748-9b12-c55c62f367ff\n"
+         "Cap:SERIAL_XON_XOFF:0\nCap:BINARY_FILE_TRANSFER:0\nCap:EEPROM:0\nCap:VOLUMETRIC:1\n"
+         "Cap:AUTOREPORT_POS:1\nCap:AUTOREPORT_TEMP:1\nCap:PROGRESS:0\nCap:PRINT_JOB:1\nCap:AUTOLEVEL:0\n"
+         "Cap:RUNOUT:0\nCap:Z_PROBE:0\nCap:LEVELING_DATA:0\nCap:BUILD_PERCENT:0\nCap:SOFTWARE_POWER:0\n"
+         "Cap:TOGGLE_LIGHTS:0\nCap:CASE_LIGHT_BRIGHTNESS:0\nCap:EMERGENCY_PARSER:" +
+         std::string(emergency_parser ? "1" : "0") +
+         "\nCap:HOST_ACTION_COMMANDS:0\nCap:PROMPT_SUPPORT:0\nCap:SDCARD:0\nCap:REPEAT:0\nCap:SD_WRITE:0\n"
+         "Cap:AUTOREPORT_SD_STATUS:0\nCap:LONG_FILENAME:0\nCap:THERMAL_PROTECTION:1\nCap:MOTION_MODES:0\n"
+         "Cap:ARCS:1\nCap:BABYSTEPPING:0\nCap:CHAMBER_TEMPERATURE:0\nCap:COOLER_TEMPERATURE:0\n"
+         "Cap:MEATPACK:0\n";
+}
+
+}  // namespace
 
 void VirtualPrinter::unknown(const std::string& command) {
   output_ += klipper() ? "// Unknown command:\"" + command.substr(0, command.find(' ')) + "\"\n"
