@@ -25,7 +25,6 @@
 #include "io/numbers/text.h"
 #include "models/files/model_file.h"
 #include "models/networks/classifier.h"
-#include "models/training/loss/schedule.h"
 #include "models/training/recipe.h"
 #include "models/training/task.h"
 

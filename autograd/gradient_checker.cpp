@@ -87,7 +87,7 @@ std::string GradientReport::text() const {
     out << wrong << " of " << entries << " entries off by more than " << kGradientTolerance << '\n';
   for (const GradientEntry& e : worst)
     out << e.place << ": analytic " << e.analytic << ", numeric " << e.numeric << ", relative error "
-        << e.relative_error << '\n';
+        << e.relative_error << (e.relative_error > kGradientTolerance ? "" : " (right)") << '\n';
   return out.str();
 }
 

@@ -34,6 +34,7 @@ struct GradientReport {
   /// How many are wrong, and one line per entry of `worst`, for a failing test to print:
   /// "1 of 72 entries off by more than 1e-06"
   /// "encoder.2.conv.1.weight [3,0,7] of [4,2,9]: analytic 0.25, numeric 0.5, relative error 0.5"
+  /// An entry of `worst` that is right ends in " (right)".
   std::string text() const;
 };
 

@@ -5,8 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <new>
-#include <type_traits>
+#include <optional>
 #include <utility>
 
 #include "autograd/tensor.h"
@@ -20,35 +19,21 @@ inline constexpr std::size_t kMaxInputs = 8;
 
 namespace detail {
 
-/// A reverse step kept inside the node: no heap allocation, set once, moved never.
-class ReverseStep {
- public:
-  ReverseStep() = default;
-  ReverseStep(const ReverseStep&) = delete;
-  ReverseStep& operator=(const ReverseStep&) = delete;
-  ~ReverseStep() { reset(); }
-
-  template <class F>
-  void set(F&& f) {
-    using Step = std::decay_t<F>;
-    static_assert(sizeof(Step) <= sizeof(storage_), "a reverse step captures a few small values only");
-    new (storage_) Step(std::forward<F>(f));
-    call_ = [](void* storage, Backward* b) {
-      Step& step = *static_cast<Step*>(storage);
-      b != nullptr ? step(*b) : step.~Step();
-    };
-  }
-  void reset() {
-    if (call_ != nullptr) std::exchange(call_, nullptr)(storage_, nullptr);
-  }
-  void operator()(Backward& b) { call_(storage_, &b); }
-
- private:
-  alignas(16) std::byte storage_[160];        // the largest: sizes and slope of a convolution
-  void (*call_)(void*, Backward*) = nullptr;  // without a Backward it destroys the step
-};
-
+/// A value, its gradient, and the inputs that it was computed from, which it owns.
 struct Node {
+  Node() = default;
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+  virtual ~Node() = default;
+  // The memory comes from the pool (autograd/kernels/fast/pool.h).
+  static void* operator new(std::size_t bytes);
+  static void operator delete(void* block, std::size_t bytes) noexcept;
+
+  /// Adds dL/dx to the gradients of the inputs. A leaf has none.
+  virtual void reverse(Backward&) {}
+  /// Destroys what the reverse step holds.
+  virtual void forget_step() noexcept {}
+
   std::atomic<std::int32_t> users{1};
   bool requires_grad = false;
   bool freed = false;    // its part of the graph is gone after backward()
@@ -60,11 +45,18 @@ struct Node {
   Tensor spare;  // the memory of a gradient that was dropped
   std::array<Node*, kMaxInputs> inputs{};
   std::size_t input_count = 0;
-  ReverseStep step;
   Node* next_to_delete = nullptr;
 };
 
-Node* new_node();
+/// The result of an op on the graph, with the reverse step that record() was given.
+template <class Step>
+struct OpNode : Node {
+  explicit OpNode(Step s) : step(std::move(s)) {}
+  void reverse(Backward& b) override { (*step)(b); }
+  void forget_step() noexcept override { step.reset(); }
+  std::optional<Step> step;
+};
+
 void retain(Node* node) noexcept;
 void release(Node* node) noexcept;
 /// Forgets how the node was computed, and deletes the inputs that nobody else holds.

@@ -1,4 +1,4 @@
-// How ops become part of the graph and of a trace, and how they refuse arguments.
+// How ops become part of the graph, and how they refuse arguments.
 #include <algorithm>
 #include <stdexcept>
 
@@ -9,43 +9,28 @@ namespace supertac {
 static thread_local bool recording = true;
 static thread_local std::uint64_t last_number = 0;
 
-std::pair<Variable, detail::ReverseStep*> make_result(const char* op, Tensor y,
-                                                      std::span<const Variable* const> inputs,
-                                                      const OpSettings* settings) {
-  Variable result(std::move(y));
-  detail::Node& node = *result.node();
-  node.op = op;
-  Trace::note(op, result, inputs, settings);
-  const bool needed = recording && std::any_of(inputs.begin(), inputs.end(),
-                                               [](const Variable* x) { return x->requires_grad(); });
-  if (!needed) return {std::move(result), nullptr};
-  if (inputs.size() > kMaxInputs)
+bool is_recorded(std::span<const Variable* const> inputs) {
+  return recording && std::ranges::any_of(inputs, [](const Variable* x) { return x->requires_grad(); });
+}
+
+Variable make_result(const char* op, Tensor y, std::span<const Variable* const> inputs,
+                     std::unique_ptr<detail::Node> node, const OpSettings* settings) {
+  const bool recorded = node != nullptr;
+  if (recorded && inputs.size() > kMaxInputs)
     refuse(op, "inputs", "at most " + std::to_string(kMaxInputs), std::to_string(inputs.size()));
-  node.requires_grad = true;
+  if (!recorded) node = std::make_unique<detail::Node>();
+  Variable result(std::move(y), recorded, std::move(node));
+  detail::Node& made = *result.node();
+  made.op = op;
+  Trace::note(op, result, inputs, settings);
+  if (!recorded) return result;
   for (const Variable* x : inputs) {
     last_number = std::max(last_number, x->node()->number);  // one of a thread that has counted further
     detail::retain(x->node());
-    node.inputs[node.input_count++] = x->node();
+    made.inputs[made.input_count++] = x->node();
   }
-  node.number = ++last_number;
-  return {std::move(result), &node.step};
-}
-
-static thread_local Trace* current = nullptr;
-
-Trace::Trace() {
-  if (current != nullptr) throw std::logic_error("Trace: this thread is traced already");
-  current = this;
-}
-
-Trace::~Trace() { current = nullptr; }
-
-void Trace::note(const char* op, const Variable& y, std::span<const Variable* const> inputs,
-                 const OpSettings* settings) {
-  if (current == nullptr) return;
-  TracedOp& traced =
-      current->ops_.emplace_back(TracedOp{op, y, {}, settings != nullptr ? *settings : OpSettings{}});
-  for (const Variable* x : inputs) traced.inputs.push_back(*x);
+  made.number = ++last_number;
+  return result;
 }
 
 NoGrad::NoGrad() : before_(std::exchange(recording, false)) {}
@@ -80,6 +65,11 @@ void check_same_shape(const char* op, const char* a_name, const Variable& a, con
 
 void check_at_least(const char* op, const char* argument, Dim value, Dim least) {
   if (value < least) refuse(op, argument, std::to_string(least) + " or more", std::to_string(value));
+}
+
+void check_between(const char* op, const char* argument, Dim value, Dim least, Dim most) {
+  if (value < least || value > most)
+    refuse(op, argument, std::to_string(least) + " to " + std::to_string(most), std::to_string(value));
 }
 
 }  // namespace supertac

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <initializer_list>
+#include <memory>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "autograd/node.h"
@@ -36,23 +38,22 @@ class Backward {
   detail::Node& node_;
 };
 
-struct OpSettings;  // autograd/trace.h
-
-/// The node of an op, and where its reverse step goes: null when no input needs a gradient or recording is
-/// off. For record() only; it stands in variable.cpp. Throws std::invalid_argument for more than kMaxInputs
-/// inputs of a node that is recorded.
-std::pair<Variable, detail::ReverseStep*> make_result(const char* op, Tensor y,
-                                                      std::span<const Variable* const> inputs,
-                                                      const OpSettings* settings);
+/// Whether the result of an op is put onto the graph: recording is on, and an input needs a gradient.
+bool is_recorded(std::span<const Variable* const> inputs);
+/// For record() only: makes y the value of `node`, or a leaf where that is null. Throws std::invalid_argument
+/// for more than kMaxInputs inputs of a node.
+Variable make_result(const char* op, Tensor y, std::span<const Variable* const> inputs,
+                     std::unique_ptr<detail::Node> node, const OpSettings* settings);
 
 /// Makes y a node of the graph. `step(Backward&)` is called by backward() with dL/dy at hand. `settings`:
 /// those of the op, for a Trace.
 template <class Step>
 Variable record(const char* op, Tensor y, std::span<const Variable* const> inputs, Step&& step,
                 const OpSettings* settings = nullptr) {
-  auto [result, slot] = make_result(op, std::move(y), inputs, settings);
-  if (slot != nullptr) slot->set(std::forward<Step>(step));
-  return std::move(result);
+  std::unique_ptr<detail::Node> node;
+  if (is_recorded(inputs))
+    node = std::make_unique<detail::OpNode<std::decay_t<Step>>>(std::forward<Step>(step));
+  return make_result(op, std::move(y), inputs, std::move(node), settings);
 }
 template <class Step>
 Variable record(const char* op, Tensor y, std::initializer_list<const Variable*> inputs, Step&& step,
@@ -71,5 +72,6 @@ void check_shape(const char* op, const char* argument, const Variable& x, const 
 void check_same_shape(const char* op, const char* a_name, const Variable& a, const char* b_name,
                       const Variable& b);
 void check_at_least(const char* op, const char* argument, Dim value, Dim least);
+void check_between(const char* op, const char* argument, Dim value, Dim least, Dim most);
 
 }  // namespace supertac

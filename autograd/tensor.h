@@ -76,6 +76,8 @@ class Tensor {
   int rank() const { return shape_.rank(); }
   Dim dim(int i) const { return shape_[i]; }
   Dim size() const { return size_; }
+  /// Of its shape, "[4,16,16,32]"; "none" where it has no buffer.
+  std::string text() const { return defined() ? shape_.text() : "none"; }
 
   real* data() { return values_; }
   const real* data() const { return values_; }

@@ -1,5 +1,5 @@
-// Trace: records which ops ran, with which inputs and settings. CompiledModel networks are built from it
-// (models/inference/compiled/compiled_model.h). ReverseWatch: stands between backward() and the reverse
+// A Trace records which ops ran, with which inputs and settings; compiled networks are built from it
+// (models/inference/compiled/compiled_model.h). A ReverseWatch stands between backward() and the reverse
 // steps. Opened training steps list both (models/training/audit/opened_step.h).
 #pragma once
 
@@ -58,6 +58,9 @@ class ReverseWatch {
   virtual ~ReverseWatch();
   ReverseWatch(const ReverseWatch&) = delete;
   ReverseWatch& operator=(const ReverseWatch&) = delete;
+
+  /// Null where none lives.
+  static ReverseWatch* of_this_thread();
 
   /// Must call `step`, which reads b.gy() and adds into the gradients of the op's inputs.
   virtual void reverse(Backward& b, const std::function<void()>& step) = 0;

@@ -1,7 +1,7 @@
 // Variables and their nodes.
 #include "autograd/variable.h"
 
-#include <stdexcept>
+#include <memory>
 #include <utility>
 
 #include "autograd/kernels/fast/pool.h"
@@ -17,7 +17,7 @@ bool drop(Node* node) { return node != nullptr && node->users.fetch_sub(1, std::
 
 // Inputs that nobody else holds are put on `dead`.
 void forget_inputs(Node& node, Node*& dead) {
-  node.step.reset();
+  node.forget_step();
   for (std::size_t i = 0; i < node.input_count; ++i) {
     Node* input = std::exchange(node.inputs[i], nullptr);
     if (drop(input)) {
@@ -35,8 +35,7 @@ void delete_all(Node* dead) {
     Node* node = dead;
     dead = node->next_to_delete;
     forget_inputs(*node, dead);
-    node->~Node();
-    pool_release(node, sizeof(Node));
+    delete node;
   }
 }
 
@@ -48,7 +47,8 @@ void forget_inputs(Node& node) noexcept {
   delete_all(dead);
 }
 
-Node* new_node() { return new (pool_allocate(sizeof(Node))) Node; }
+void* Node::operator new(std::size_t bytes) { return pool_allocate(bytes); }
+void Node::operator delete(void* block, std::size_t bytes) noexcept { pool_release(block, bytes); }
 
 void retain(Node* node) noexcept {
   if (node != nullptr) node->users.fetch_add(1, std::memory_order_relaxed);
@@ -62,15 +62,18 @@ void release(Node* node) noexcept {
 
 using detail::Node;
 
-Variable::Variable(Tensor value, bool requires_grad) {
+Variable::Variable(Tensor value, bool requires_grad)
+    : Variable(std::move(value), requires_grad, std::make_unique<Node>()) {}
+
+Variable::Variable(Tensor value, bool requires_grad, std::unique_ptr<Node> node) {
   if (!value.defined()) refuse("Variable", "value", "a tensor", "an undefined one");
-  node_ = detail::new_node();
+  node_ = node.release();
   node_->value = std::move(value);
   node_->requires_grad = requires_grad;
 }
 
 Node& Variable::checked() const {
-  if (node_ == nullptr) throw std::invalid_argument("Variable: used before it was given a value");
+  if (node_ == nullptr) refuse("Variable", "what is used", "a value", "an empty Variable");
   return *node_;
 }
 

@@ -6,6 +6,8 @@
 // as soon as its reverse step has run.
 #pragma once
 
+#include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -13,6 +15,8 @@
 #include "autograd/tensor.h"
 
 namespace supertac {
+
+struct OpSettings;  // autograd/trace.h
 
 /// A handle to one node of the graph (or to a leaf: a parameter or an input). What asks for the value or the
 /// gradient of an empty handle throws std::invalid_argument.
@@ -60,6 +64,9 @@ class Variable {
 
  private:
   friend std::vector<Variable> inputs_of(const Variable& y);
+  friend Variable make_result(const char* op, Tensor y, std::span<const Variable* const> inputs,
+                              std::unique_ptr<detail::Node> node, const OpSettings* settings);
+  Variable(Tensor value, bool requires_grad, std::unique_ptr<detail::Node> node);
   detail::Node& checked() const;
   detail::Node* node_ = nullptr;
 };

@@ -16,7 +16,6 @@
 #include <supertac/io/images/images.h>
 #include <supertac/layers/convolution.h>
 #include <supertac/layers/linear.h>
-#include <supertac/models/training/loss/schedule.h>
 
 using namespace supertac;
 
@@ -30,21 +29,13 @@ constexpr ConvLayerOptions kHalve{.kernel = 3, .stride = 2, .padding = 1},
 class Vae : public Module {
  public:
   explicit Vae(Rng& rng)
-      : halve1_(1, 16, kHalve, rng),
-        halve2_(16, kMaps, kHalve, rng),
-        mean_(kMaps * kCoarse * kCoarse, kLatent, rng),
-        log_var_(kMaps * kCoarse * kCoarse, kLatent, rng),
-        unfold_(kLatent, kMaps * kCoarse * kCoarse, rng),
-        double1_(kMaps, 16, kDouble, rng),
-        double2_(16, 1, kDouble, rng) {
-    add("halve1", halve1_);
-    add("halve2", halve2_);
-    add("mean", mean_);
-    add("log_var", log_var_);
-    add("unfold", unfold_);
-    add("double1", double1_);
-    add("double2", double2_);
-  }
+      : halve1_(add("halve1", Conv2d(1, 16, kHalve, rng))),
+        halve2_(add("halve2", Conv2d(16, kMaps, kHalve, rng))),
+        mean_(add("mean", Linear(kMaps * kCoarse * kCoarse, kLatent, rng))),
+        log_var_(add("log_var", Linear(kMaps * kCoarse * kCoarse, kLatent, rng))),
+        unfold_(add("unfold", Linear(kLatent, kMaps * kCoarse * kCoarse, rng))),
+        double1_(add("double1", ConvTranspose2d(kMaps, 16, kDouble, rng))),
+        double2_(add("double2", ConvTranspose2d(16, 1, kDouble, rng))) {}
 
   struct Output {
     Variable mean, log_var, picture;  // [N,4], [N,4], [N,16,16,1]

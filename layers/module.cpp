@@ -16,7 +16,7 @@ Variable Module::add_parameter(const std::string& name, Tensor value, Layout lay
   return parameters_.emplace_back(Parameter{name, Variable(std::move(value), true), layout}).value;
 }
 
-void Module::add(const std::string& name, const Module& part) {
+void Module::add_parameters(const std::string& name, const Module& part) {
   for (const Parameter& p : part.parameters())
     parameters_.push_back({name + "." + p.name, p.value, p.layout});
 }

@@ -58,10 +58,24 @@ class Module {
  protected:
   ~Module() = default;  // not virtual: a layer is never deleted as a mere Module
   Variable add_parameter(const std::string& name, Tensor value, Layout layout);
-  /// Adds the parameters of a part of this module to the list, as "name.its_name".
-  void add(const std::string& name, const Module& part);
+  /// Adds the parameters of a part of this module to the list, as "name.its_name", and returns the part:
+  ///   fc_(add("fc", Linear(in, out, rng)))
+  template <class Part>
+  Part add(const std::string& name, Part part) {
+    add_parameters(name, part);
+    return part;
+  }
+  /// The same of `count` parts, "name.0", "name.1" ...; make(i) is the i-th.
+  template <class Make>
+  auto add_each(const std::string& name, Dim count, Make make) {
+    std::vector<decltype(make(Dim{}))> parts;
+    for (Dim i = 0; i < count; ++i) parts.push_back(add(name + "." + std::to_string(i), make(i)));
+    return parts;
+  }
 
  private:
+  void add_parameters(const std::string& name, const Module& part);
+
   std::vector<Parameter> parameters_;
 };
 

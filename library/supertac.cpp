@@ -19,7 +19,7 @@
 #include "io/numbers/numbers.h"
 #include "library/guard.h"
 #include "models/files/model_file.h"
-#include "models/inference/ensemble.h"
+#include "models/inference/compiled/compiled_model.h"
 #include "models/training/train.h"
 
 using namespace supertac;

@@ -155,10 +155,10 @@ void convolutions(Cases& cases) {
     Dim rows, in, out;
   } matrices[] = {{1, 1, 1}, {2, 3, 17}, {1, 33, 3}, {19, 17, 33}, {2, 40, 512}};
   for (const auto& m : matrices)
-    for (const real slope : {kNoActivation, kRelu, kLeakyRelu})
+    for (const real negative_slope : {kNoActivation, kRelu, kLeakyRelu})
       cases.op("linear", {"x", "weight", "bias"},
                {uniform({m.rows, m.in}, 1), uniform({m.in, m.out}, 2), uniform({m.out}, 3)},
-               [=](const Leaves& in) { return linear(in[0], in[1], in[2], slope); });
+               [=](const Leaves& in) { return linear(in[0], in[1], in[2], negative_slope); });
 }
 
 void shaping(Cases& cases) {

@@ -7,7 +7,7 @@
 
 #include "apps/common/output/output_folder.h"
 #include "data/windows/windows.h"
-#include "models/inference/ensemble.h"
+#include "models/inference/compiled/compiled_model.h"
 #include "models/inference/interval.h"
 
 namespace supertac {

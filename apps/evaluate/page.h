@@ -11,7 +11,7 @@
 #include "apps/evaluate/scoring.h"
 #include "data/scores/metrics.h"
 #include "data/windows/windows.h"
-#include "models/inference/ensemble.h"
+#include "models/inference/compiled/compiled_model.h"
 
 namespace supertac {
 

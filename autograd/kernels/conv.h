@@ -40,7 +40,8 @@ inline constexpr Dim kMaxChannels = 4096;
 inline constexpr Dim kRowsPerPiece = 256;
 
 /// f(x) = x for x > 0, else slope * x: the activation behind a convolution or a linear layer. With a slope of
-/// 0 minus infinity counts as the lowest finite number, since 0 times infinity is NaN.
+/// 0 minus infinity counts as the lowest finite number, since 0 times infinity is NaN. Backward, of y = f(s):
+/// gs = gy f'(s) = y > 0 ? gy : slope * gy, since y has the sign of s.
 struct Rectifier {
   real slope, floor;
   explicit Rectifier(real negative_slope)

@@ -1,4 +1,5 @@
-// The arithmetic of losses, callable without a graph. It checks nothing.
+// The arithmetic of losses and of the VAE's sample, callable without a graph. It checks nothing. Sizes count
+// elements; arrays of one function have one shape.
 #pragma once
 
 #include <algorithm>
@@ -32,6 +33,17 @@ inline double cross_entropy(Dim classes, const real* logits, Dim label, real* re
   for (Dim k = 0; k < classes; ++k) rest[k] = static_cast<real>(static_cast<double>(rest[k]) / norm);
   rest[label] -= 1;
   return std::log(norm) - static_cast<double>(logits[label] - largest);
+}
+
+/// z = mean + e^(log_var / 2) eps
+inline void sample_gaussian(Dim size, const real* mean, const real* log_var, const real* eps, real* z) {
+  each(size, [=](Dim i) { z[i] = mean[i] + exp_same_bits(log_var[i] / 2) * eps[i]; });
+}
+/// gmean = gz,  glog_var = gz (z - mean) / 2, which is half of e^(log_var / 2) eps
+inline void sample_gaussian_grad(Dim size, const real* gz, const real* z, const real* mean, Slot gmean,
+                                 Slot glog_var) {
+  each_into(size, gmean, [=](Dim i) { return gz[i]; });
+  each_into(size, glog_var, [=](Dim i) { return gz[i] * (z[i] - mean[i]) / 2; });
 }
 
 /// -1/2 of the sum over `size` latents of 1 + log_var - mean^2 - e^log_var

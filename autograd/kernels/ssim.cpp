@@ -104,6 +104,7 @@ class SsimImage {
             std::max(va, real(0)) + std::max(vb, real(0)) + kC2};
   }
 
+  // x, target [h,w] -> their centred images [h,w], and windowed means, squares and product [oh,ow]
   void take_moments(const real* x, const real* target) {
     centre_a_ = centre(x, a_);
     centre_b_ = centre(target, b_);
@@ -114,6 +115,7 @@ class SsimImage {
     blur_product(a_, b_, ab_);
   }
 
+  // to = x - its mean, [h,w]; returns the mean
   real centre(const real* x, real* to) const {
     const auto mean =
         static_cast<real>(sum_of(h_ * wd_, [x](Dim i) { return x[i]; }) / static_cast<double>(h_ * wd_));
@@ -121,6 +123,7 @@ class SsimImage {
     return mean;
   }
 
+  // to [oh,ow] = blur(a b), a, b [h,w]
   void blur_product(const real* a, const real* b, real* to) {
     real* product = map(8);
     for (Dim i = 0; i < h_ * wd_; ++i) product[i] = a[i] * b[i];
@@ -167,10 +170,10 @@ class SsimImage {
   Window w_;
   Dim h_, wd_, oh_, ow_;
   Scratch<real> store_;
-  real *const a_ = map(0), *const b_ = map(1);  // the two images less their means
+  real *const a_ = map(0), *const b_ = map(1);  // [h,w]: the two images less their means
   real centre_a_ = 0, centre_b_ = 0;
   real *const mean_a_ = map(2), *const mean_b_ = map(3), *const aa_ = map(4), *const bb_ = map(5),
-              *const ab_ = map(6);  // windowed
+              *const ab_ = map(6);  // [oh,ow]: windowed, of a, b, a a, b b and a b
 };
 
 }  // namespace

@@ -25,7 +25,7 @@ void check_slope(const char* op, real slope) {
   if (!(slope >= 0)) refuse(op, "negative_slope", "0 or more", std::to_string(slope));
 }
 
-// y = f(s) and gy of one shape;  gy becomes gs = y > 0 ? gy : slope gy
+// y = f(s) and gy of one shape;  gy becomes gs = gy f'(s) = y > 0 ? gy : slope gy (kernels::Rectifier)
 const real* before_activation(Backward& g, real slope) {
   const real* y = g.y().data();
   real* gs = g.mutable_gy().data();

@@ -24,7 +24,7 @@ Variable global_mean(const Variable& x) {
 // ga = gy     gx = gy s     gs[n,c] = sum over h, w of gy x
 Variable gated_sum(const Variable& a, const Variable& x, const Variable& s) {
   const kernels::Maps maps = maps_of("gated_sum", x);
-  check_same_shape("gated_sum", "a", a, "x", x);
+  check_same_shape("gated_sum", "x", x, "a", a);
   check_shape("gated_sum", "s", s, {x.dim(0), x.dim(3)});
   Tensor y(x.shape());
   kernels::gated_sum(maps, a.value().data(), x.value().data(), s.value().data(), y.data());

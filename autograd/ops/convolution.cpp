@@ -9,6 +9,8 @@ namespace {
 using kernels::ConvSettings;
 using kernels::ConvSizes;
 
+constexpr Dim kMostPixels = 4096;  // of a stride, and of a margin
+
 void check_arguments(const char* op, const Variable& x, const Variable& w, const Variable& b,
                      const ConvOptions& o, int rank) {
   check_rank(op, "x", x, rank);
@@ -21,8 +23,8 @@ void check_arguments(const char* op, const Variable& x, const Variable& w, const
   if (w.dim(0) < 1 || w.dim(rank - 3) < 1) refuse(op, "w", "a kernel of 1 or more", w.shape().text());
   check_shape(op, "b", b, {out});
   check_slope(op, o.negative_slope);
-  check_at_least(op, "stride", o.stride, 1);
-  check_at_least(op, "padding", o.padding, 0);
+  check_between(op, "stride", o.stride, 1, kMostPixels);
+  check_between(op, "padding", o.padding, 0, kMostPixels);
 }
 
 ConvSettings settings_of(const Variable& x, const Variable& w, const ConvOptions& o, bool transposed) {

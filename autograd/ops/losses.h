@@ -9,7 +9,7 @@
 
 namespace supertac {
 
-/// The mean squared error over all elements; x and target of the same shape, both may require gradients.
+/// mean of (x - target)^2 over all elements; x, target [...] of one shape, both may require gradients.
 Variable l2_loss(const Variable& x, const Variable& target);
 
 /// Mean structural similarity (Wang et al. 2004, eq. 13) of windows of x and target [N,H,W,1], H, W >= 3,

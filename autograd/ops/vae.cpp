@@ -6,19 +6,17 @@
 namespace supertac {
 
 // mean, log_var, eps, z [N,LD];  z = mean + e^(log_var / 2) eps
-// gmean = gz     glog_var = gz (z - mean) / 2, which is half of e^(log_var / 2) eps
+// gmean = gz     glog_var = gz (z - mean) / 2
 Variable sample_gaussian(const Variable& mean, const Variable& log_var, const Tensor& eps) {
   check_rank("sample_gaussian", "mean", mean, 2);
   check_same_shape("sample_gaussian", "mean", mean, "log_var", log_var);
-  if (eps.shape() != mean.shape()) refuse("sample_gaussian", "eps", mean.shape().text(), eps.shape().text());
+  if (eps.shape() != mean.shape()) refuse("sample_gaussian", "eps", mean.shape().text(), eps.text());
   Tensor z(mean.shape());
-  each(z.size(), [m = mean.value().data(), v = log_var.value().data(), e = eps.data(), to = z.data()](Dim i) {
-    to[i] = m[i] + kernels::exp_same_bits(v[i] / 2) * e[i];
-  });
+  kernels::sample_gaussian(z.size(), mean.value().data(), log_var.value().data(), eps.data(), z.data());
   const auto reverse = [](Backward& g) {
-    const real *gz = g.gy().data(), *sample = g.y().data(), *m = g.value(0).data();
-    add_to_gradient(g, 0, [=](Dim i) { return gz[i]; });
-    add_to_gradient(g, 1, [=](Dim i) { return gz[i] * (sample[i] - m[i]) / 2; });
+    const Tensor &gz = g.gy(), &sample = g.y(), &m = g.value(0);
+    const Slot gmean = g.slot_of(0), glog_var = g.slot_of(1);
+    kernels::sample_gaussian_grad(gz.size(), gz.data(), sample.data(), m.data(), gmean, glog_var);
   };
   const OpSettings settings{.constant = eps};
   return record("sample_gaussian", z, {&mean, &log_var}, reverse, &settings);

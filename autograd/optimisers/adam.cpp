@@ -4,6 +4,7 @@
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <numbers>
 #include <numeric>
 
 #include "autograd/kernels/conv.h"
@@ -32,23 +33,6 @@ void update(Dim n, Update u, const real* gradient, real* x, real* m, real* v) {
   });
 }
 
-// Muon's step.
-void move_matrix(const Shape& shape, real clip, double rate, const real* gradient, real* x, real* m) {
-  constexpr real kMomentum = real(0.95), kRest = real(0.05);
-  const Dim n = shape.elements(), columns = shape[shape.rank() - 1], rows = n / columns;
-  Scratch<real> direction(static_cast<std::size_t>(n));
-  real* to = direction.data();
-  kernels::each(n, [=](Dim i) {
-    const real g = clip * gradient[i], moment = flushed(kMomentum * m[i] + kRest * g);
-    m[i] = moment;
-    to[i] = kMomentum * moment + kRest * g;  // Nesterov's
-  });
-  orthogonalise(rows, columns, to);
-  const auto length =
-      static_cast<real>(kMuonLength * rate * std::sqrt(static_cast<double>(std::max(rows, columns))));
-  kernels::each(n, [=](Dim i) { x[i] += -length * to[i]; });
-}
-
 double sum_of_squares(Dim n, const real* x) {
   return kernels::sum_of(n, [=](Dim i) { return static_cast<double>(x[i]) * static_cast<double>(x[i]); });
 }
@@ -63,6 +47,87 @@ double power(double base, std::int64_t exponent) {
 }
 
 }  // namespace
+
+Adam::Adam(std::vector<Variable> parameters, const AdamOptions& options)
+    : parameters_(std::move(parameters)), options_(options) {
+  const auto require = [](bool holds, const char* option, const char* expected, double got) {
+    if (!holds) refuse("Adam", option, expected, std::to_string(got));
+  };
+  const auto in_unit = [](double beta) { return beta >= 0 && beta < 1; };
+  require(options.learning_rate >= 0, "learning_rate", "0 or more", options.learning_rate);
+  require(in_unit(options.beta1), "beta1", "a number in [0,1)", options.beta1);
+  require(in_unit(options.beta2), "beta2", "a number in [0,1)", options.beta2);
+  require(options.epsilon > 0, "epsilon", "more than 0", options.epsilon);
+  require(options.clip_norm >= 0, "clip_norm", "0 or more", options.clip_norm);
+  for (std::size_t k = 0; k < parameters_.size(); ++k) {
+    Variable& p = parameters_[k];
+    if (!p.requires_grad())
+      refuse("Adam", "parameter " + std::to_string(k), "to require a gradient", "a constant");
+    (options.muon && is_matrix(p.shape()) ? matrices_ : others_).push_back(k);
+    p.mutable_grad() = Tensor::zeros(p.shape());
+    m_.push_back(Tensor::zeros(p.shape()));
+    v_.push_back(Tensor::zeros(p.shape()));
+  }
+  squares_.resize(parameters_.size());
+}
+
+void Adam::zero_grad() {
+  for (Variable& p : parameters_) p.mutable_grad().fill(0);
+}
+
+double Adam::step() {
+  for (std::size_t k = 0; k < parameters_.size(); ++k) {
+    const Variable& x = parameters_[k];
+    if (!x.grad().defined() || x.grad().shape() != x.shape())
+      refuse("Adam", "parameter " + std::to_string(k), "a gradient " + x.shape().text(),
+             (x.grad().defined() ? x.grad().shape().text() : "none") + "; run backward() before step()");
+  }
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t k = 0; k < parameters_.size(); ++k)
+    squares_[k] = sum_of_squares(parameters_[k].size(), parameters_[k].grad().data());
+  const double squares = std::accumulate(squares_.begin(), squares_.end(), 0.0);
+  const double norm = std::sqrt(squares);
+  if (!std::isfinite(norm)) return norm;
+  const double factor = options_.clip_norm > 0 && norm > options_.clip_norm ? options_.clip_norm / norm : 1;
+  // An infinite second moment would stop its parameter for ever.
+  if (!std::isfinite(static_cast<real>(factor * factor * squares))) {
+    return std::numeric_limits<double>::infinity();
+  }
+  ++steps_;
+  const Update u{static_cast<real>(factor),
+                 static_cast<real>(options_.beta1),
+                 static_cast<real>(1 - options_.beta1),
+                 static_cast<real>(options_.beta2),
+                 static_cast<real>(1 - options_.beta2),
+                 static_cast<real>(options_.learning_rate / (1 - power(options_.beta1, steps_))),
+                 static_cast<real>(1 / std::sqrt(1 - power(options_.beta2, steps_))),
+                 static_cast<real>(options_.epsilon)};
+#pragma omp parallel for schedule(dynamic)
+  for (const std::size_t k : others_) {
+    Variable& p = parameters_[k];
+    update(p.size(), u, p.grad().data(), p.mutable_value().data(), m_[k].data(), v_[k].data());
+  }
+  move_matrices(u.clip);
+  return norm;
+}
+
+// The Taylor series, since the last bits of the C library's cosine depend on the processor. For |x| <= pi the
+// first term left out is below 1e-19.
+static double series_of_cosine(double x) {
+  double sum = 1, term = 1;
+  for (int k = 2; k <= 30; k += 2) sum += term *= -x * x / (k * (k - 1));
+  return sum;
+}
+
+double Schedule::at(std::int64_t step) const {
+  if (step < warm_up) return peak * static_cast<double>(step + 1) / static_cast<double>(warm_up);
+  if (total <= warm_up) return peak;
+  const double done =
+      std::min(1.0, static_cast<double>(step - warm_up) / static_cast<double>(total - warm_up));
+  return peak * (1 + series_of_cosine(std::numbers::pi * done)) / 2;
+}
+
+// Muon.
 
 // With S = X X^T a step is X <- P X, P = a I + b S + c S^2, and S <- P S P, so that Q, the product of all P,
 // is found without X.
@@ -112,31 +177,20 @@ bool is_matrix(const Shape& shape) {
   return columns >= kFewest && shape.elements() / columns >= kFewest;
 }
 
-Adam::Adam(std::vector<Variable> parameters, const AdamOptions& options)
-    : parameters_(std::move(parameters)), options_(options) {
-  const auto require = [](bool holds, const char* option, const char* expected, double got) {
-    if (!holds) refuse("Adam", option, expected, std::to_string(got));
-  };
-  const auto in_unit = [](double beta) { return beta >= 0 && beta < 1; };
-  require(options.learning_rate >= 0, "learning_rate", "0 or more", options.learning_rate);
-  require(in_unit(options.beta1), "beta1", "a number in [0,1)", options.beta1);
-  require(in_unit(options.beta2), "beta2", "a number in [0,1)", options.beta2);
-  require(options.epsilon > 0, "epsilon", "more than 0", options.epsilon);
-  require(options.clip_norm >= 0, "clip_norm", "0 or more", options.clip_norm);
-  for (std::size_t k = 0; k < parameters_.size(); ++k) {
-    Variable& p = parameters_[k];
-    if (!p.requires_grad())
-      refuse("Adam", "parameter " + std::to_string(k), "to require a gradient", "a constant");
-    (options.muon && is_matrix(p.shape()) ? matrices_ : others_).push_back(k);
-    p.mutable_grad() = Tensor::zeros(p.shape());
-    m_.push_back(Tensor::zeros(p.shape()));
-    v_.push_back(Tensor::zeros(p.shape()));
-  }
-  squares_.resize(parameters_.size());
-}
-
-void Adam::zero_grad() {
-  for (Variable& p : parameters_) p.mutable_grad().fill(0);
+static void move_matrix(const Shape& shape, real clip, double rate, const real* gradient, real* x, real* m) {
+  constexpr real kMomentum = real(0.95), kRest = real(0.05);
+  const Dim n = shape.elements(), columns = shape[shape.rank() - 1], rows = n / columns;
+  Scratch<real> direction(static_cast<std::size_t>(n));
+  real* to = direction.data();
+  kernels::each(n, [=](Dim i) {
+    const real g = clip * gradient[i], moment = flushed(kMomentum * m[i] + kRest * g);
+    m[i] = moment;
+    to[i] = kMomentum * moment + kRest * g;  // Nesterov's
+  });
+  orthogonalise(rows, columns, to);
+  const auto length =
+      static_cast<real>(kMuonLength * rate * std::sqrt(static_cast<double>(std::max(rows, columns))));
+  kernels::each(n, [=](Dim i) { x[i] += -length * to[i]; });
 }
 
 // By turns, so that a thread asks its pool for the same blocks in every step.
@@ -154,42 +208,6 @@ void Adam::move_matrices(real clip) {
     }
   }
   if (error) std::rethrow_exception(error);
-}
-
-double Adam::step() {
-  for (std::size_t k = 0; k < parameters_.size(); ++k) {
-    const Variable& x = parameters_[k];
-    if (!x.grad().defined() || x.grad().shape() != x.shape())
-      refuse("Adam", "parameter " + std::to_string(k), "a gradient " + x.shape().text(),
-             (x.grad().defined() ? x.grad().shape().text() : "none") + "; run backward() before step()");
-  }
-#pragma omp parallel for schedule(dynamic)
-  for (std::size_t k = 0; k < parameters_.size(); ++k)
-    squares_[k] = sum_of_squares(parameters_[k].size(), parameters_[k].grad().data());
-  const double squares = std::accumulate(squares_.begin(), squares_.end(), 0.0);
-  const double norm = std::sqrt(squares);
-  if (!std::isfinite(norm)) return norm;
-  const double factor = options_.clip_norm > 0 && norm > options_.clip_norm ? options_.clip_norm / norm : 1;
-  // An infinite second moment would stop its parameter for ever.
-  if (!std::isfinite(static_cast<real>(factor * factor * squares))) {
-    return std::numeric_limits<double>::infinity();
-  }
-  ++steps_;
-  const Update u{static_cast<real>(factor),
-                 static_cast<real>(options_.beta1),
-                 static_cast<real>(1 - options_.beta1),
-                 static_cast<real>(options_.beta2),
-                 static_cast<real>(1 - options_.beta2),
-                 static_cast<real>(options_.learning_rate / (1 - power(options_.beta1, steps_))),
-                 static_cast<real>(1 / std::sqrt(1 - power(options_.beta2, steps_))),
-                 static_cast<real>(options_.epsilon)};
-#pragma omp parallel for schedule(dynamic)
-  for (const std::size_t k : others_) {
-    Variable& p = parameters_[k];
-    update(p.size(), u, p.grad().data(), p.mutable_value().data(), m_[k].data(), v_[k].data());
-  }
-  move_matrices(u.clip);
-  return norm;
 }
 
 }  // namespace supertac

@@ -1,5 +1,5 @@
 // Adam (Kingma & Ba 2015, algorithm 1) with bias correction and clipping of the gradient norm; and Muon
-// (Jordan et al. 2024) for matrices of weights, as an option.
+// (Jordan et al. 2024) for matrices of weights, as an option. And the learning rate over a training.
 #pragma once
 
 #include <cstdint>
@@ -76,6 +76,15 @@ class Adam {
   std::vector<double> squares_;                 // summed, of each gradient
   std::vector<Tensor> m_, v_;
   std::int64_t steps_ = 0;
+};
+
+/// The learning rate at `step` (from 0) of `total`: a linear rise over `warm_up` steps to `peak`, then half a
+/// cosine down to 0 (Loshchilov & Hutter 2017, eq. 5, one period).
+struct Schedule {
+  double peak = 1e-3;
+  std::int64_t warm_up = 0;
+  std::int64_t total = 1;
+  double at(std::int64_t step) const;
 };
 
 }  // namespace supertac

@@ -7,7 +7,7 @@
 
 #include "data/scores/metrics.h"
 #include "data/windows/windows.h"
-#include "models/inference/ensemble.h"
+#include "models/inference/compiled/compiled_model.h"
 
 namespace supertac {
 

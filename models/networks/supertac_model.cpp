@@ -1,23 +1,21 @@
 #include "models/networks/supertac_model.h"
 
 #include <algorithm>
+#include <bit>
 #include <stdexcept>
 
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/shaping.h"
 #include "autograd/ops/vae.h"
+#include "autograd/record.h"
 
 namespace supertac {
 namespace {
 
 constexpr Dim kMostWeights = Dim{1} << 28;
 
-void check_range(const char* name, Dim value, Dim low, Dim high) {
-  if (value >= low && value <= high) return;
-  throw std::invalid_argument(std::string("model settings: ") + name + " must be " + std::to_string(low) +
-                              " to " + std::to_string(high) + ", got " + std::to_string(value));
-}
+constexpr const char* kSettings = "model settings";  // what messages begin with
 
 SuperTacSettings checked(const SuperTacSettings& settings) {
   settings.check();
@@ -26,26 +24,6 @@ SuperTacSettings checked(const SuperTacSettings& settings) {
 
 VaeOptions vae_options(const SuperTacSettings& s) {
   return {.timesteps = s.timesteps, .channels = s.group_signals(), .latent = s.latent};
-}
-
-template <class Part>
-std::vector<Part> make_parts(const SuperTacSettings& s, Rng& rng) {
-  std::vector<Part> parts;
-  for (Dim i = 0; i < s.groups(); ++i) parts.emplace_back(vae_options(s), rng);
-  return parts;
-}
-
-std::optional<Linear> fc_of(const SuperTacSettings& s, Rng& rng) {
-  if (s.latents() == 0) return std::nullopt;
-  return Linear(s.latents(), s.channels * s.rows * s.columns, rng);
-}
-
-std::vector<Rirb> make_rirbs(const SuperTacSettings& s, Rng& rng) {
-  std::vector<Rirb> rirbs;
-  for (Dim size = 1; size < s.scale; size *= 2) {
-    rirbs.emplace_back(RirbOptions{.channels = s.channels, .blocks = s.rcabs}, rng);
-  }
-  return rirbs;
 }
 
 // concat() takes eight at most. Of no groups undefined.
@@ -66,7 +44,7 @@ Variable concat_groups(std::span<const Variable> groups) {
 Grouping grouping_of(const std::string& name) {
   if (name == "horizontal") return Grouping::horizontal;
   if (name == "vertical") return Grouping::vertical;
-  throw std::invalid_argument("grouping must be horizontal or vertical, got \"" + name + "\"");
+  refuse(kSettings, "grouping", "horizontal or vertical", "\"" + name + "\"");
 }
 
 std::string name_of(Grouping grouping) {
@@ -74,31 +52,26 @@ std::string name_of(Grouping grouping) {
 }
 
 void SuperTacSettings::check() const {
-  const bool frames = timesteps == 1;
-  check_range("rows", rows, 1, kMostLines);
-  check_range("columns", columns, 1, kMostLines);
-  check_range("in_channels", in_channels, 1, 8);
-  if (!frames) check_range("timesteps", timesteps, 32, 512);
-  if (!frames && timesteps % 16 != 0) {
-    throw std::invalid_argument(
-        "model settings: timesteps must be a multiple of 16 (the encoder halves four times) or 1, got " +
-        std::to_string(timesteps));
-  }
-  check_range("latent", latent, 1, 256);
+  const auto text = [](Dim number) { return std::to_string(number); };
+  const std::string array = text(rows) + "x" + text(columns);
+  check_between(kSettings, "rows", rows, 1, kMostLines);
+  check_between(kSettings, "columns", columns, 1, kMostLines);
+  check_between(kSettings, "in_channels", in_channels, 1, 8);
+  if (timesteps != 1) check_between(kSettings, "timesteps", timesteps, 32, 512);
+  if (timesteps != 1 && timesteps % 16 != 0)
+    refuse(kSettings, "timesteps", "a multiple of 16 (the encoder halves four times) or 1", text(timesteps));
+  check_between(kSettings, "latent", latent, 1, 256);
   if (scale != 2 && scale != 4 && scale != 8 && scale != 16)
-    throw std::invalid_argument("model settings: scale must be 2, 4, 8 or 16, got " + std::to_string(scale));
+    refuse(kSettings, "scale", "2, 4, 8 or 16", text(scale));
   const auto [least, most] = std::minmax({image_height(), image_width()});
   if (least < 3 || most > 1024)
-    throw std::invalid_argument("model settings: scale " + std::to_string(scale) + " of an array of " +
-                                std::to_string(rows) + "x" + std::to_string(columns) + " makes pictures of " +
-                                std::to_string(image_height()) + "x" + std::to_string(image_width()) +
-                                " pixels, expected 3 to 1024 a side");
-  check_range("channels", channels, 4, 256);
-  check_range("rcabs", rcabs, 0, 16);
+    refuse(kSettings, "scale " + text(scale) + " of an array of " + array,
+           "pictures of 3 to 1024 pixels a side", text(image_height()) + "x" + text(image_width()));
+  check_between(kSettings, "channels", channels, 4, 256);
+  check_between(kSettings, "rcabs", rcabs, 0, 16);
   if (latents() * channels * rows * columns > kMostWeights)
-    throw std::invalid_argument("model settings: " + std::to_string(latents()) + " latents of an array of " +
-                                std::to_string(rows) + "x" + std::to_string(columns) +
-                                " make a layer of more than 2^28 weights; choose fewer latents or channels");
+    refuse(kSettings, "latent of an array of " + array, "a layer of at most 2^28 weights",
+           text(latents()) + " latents; choose fewer latents or channels");
 }
 
 SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
@@ -110,19 +83,15 @@ SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
 }
 
 Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
-    : rows_(s.rows),
-      columns_(s.columns),
-      in_channels_(s.in_channels),
-      fc_(fc_of(s, rng)),
-      rirbs_(make_rirbs(s, rng)),
-      out_(s.channels, 1, kSameSize, rng) {
-  if (s.predicted_error) predicted_error_.emplace(s.channels, 1, kSameSize, rng);
-  if (s.sees_last_frame()) last_frame_.emplace(s.in_channels, s.channels, kSameSize, rng);
-  if (fc_) add("fc", *fc_);
-  for (std::size_t i = 0; i < rirbs_.size(); ++i) add("rirb." + std::to_string(i), rirbs_[i]);
-  add("out", out_);
-  if (predicted_error_) add("spread", *predicted_error_);
-  if (last_frame_) add("last_frame", *last_frame_);
+    : rows_(s.rows), columns_(s.columns), in_channels_(s.in_channels) {
+  if (s.latents() > 0) fc_.emplace(add("fc", Linear(s.latents(), s.channels * s.rows * s.columns, rng)));
+  const auto doublings = static_cast<Dim>(std::countr_zero(static_cast<std::uint64_t>(s.scale)));
+  const RirbOptions rirb{.channels = s.channels, .blocks = s.rcabs};
+  rirbs_ = add_each("rirb", doublings, [&](Dim) { return Rirb(rirb, rng); });
+  out_.emplace(add("out", Conv2d(s.channels, 1, kSameSize, rng)));
+  if (s.predicted_error) predicted_error_.emplace(add("spread", Conv2d(s.channels, 1, kSameSize, rng)));
+  if (s.sees_last_frame())
+    last_frame_.emplace(add("last_frame", Conv2d(s.in_channels, s.channels, kSameSize, rng)));
 }
 
 Variable Upsampler::map_of(const Variable& latents, const Variable& windows) const {
@@ -140,25 +109,24 @@ Variable Upsampler::map_of(const Variable& latents, const Variable& windows) con
 Prediction Upsampler::forward(const Variable& latents, const Variable& windows) const {
   Variable h = map_of(latents, windows);                // [N,rows,columns,channels]
   for (const Rirb& rirb : rirbs_) h = rirb.forward(h);  // twice as high and wide by each
-  return {out_.forward(h), predicted_error_ ? predicted_error_->forward(h) : Variable(), latents};
+  return {out_->forward(h), predicted_error_ ? predicted_error_->forward(h) : Variable(), latents};
 }
 
 SuperTac::SuperTac(const SuperTacSettings& settings, Rng& rng)
     : settings_(checked(settings)),
-      encoders_(make_parts<Encoder>(settings, rng)),
-      decoders_(make_parts<Decoder>(settings, rng)),
-      upsampler_(settings, rng) {
-  for (std::size_t i = 0; i < encoders_.size(); ++i) add("encoder." + std::to_string(i), encoders_[i]);
-  for (std::size_t i = 0; i < decoders_.size(); ++i) add("decoder." + std::to_string(i), decoders_[i]);
-  add("upsampler", upsampler_);
-}
+      encoders_(
+          add_each("encoder", settings.groups(), [&](Dim) { return Encoder(vae_options(settings), rng); })),
+      decoders_(
+          add_each("decoder", settings.groups(), [&](Dim) { return Decoder(vae_options(settings), rng); })),
+      upsampler_(add("upsampler", Upsampler(settings, rng))) {}
 
 // The signals of a group are its taxels in order, each with its channels.
 PerGroup<Variable> SuperTac::split(const Variable& windows) const {
   const SuperTacSettings& s = settings_;
   if (windows.rank() != 3 || windows.dim(1) != s.timesteps || windows.dim(2) != s.signals()) {
-    throw std::invalid_argument("SuperTac: windows expects [N," + std::to_string(s.timesteps) + "," +
-                                std::to_string(s.signals()) + "], got " + windows.shape().text());
+    refuse("SuperTac", "windows",
+           "[N," + std::to_string(s.timesteps) + "," + std::to_string(s.signals()) + "]",
+           windows.shape().text());
   }
   const Dim row = s.columns * s.in_channels;
   const Dim run = s.grouping == Grouping::horizontal ? row : s.in_channels;
@@ -171,8 +139,7 @@ PerGroup<Variable> SuperTac::split(const Variable& windows) const {
 SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor> eps) const {
   const Dim groups = settings_.groups();
   if (eps.size() != static_cast<std::size_t>(groups)) {
-    throw std::invalid_argument("SuperTac: eps expects " + std::to_string(groups) + " tensors, got " +
-                                std::to_string(eps.size()));
+    refuse("SuperTac", "eps", std::to_string(groups) + " tensors", std::to_string(eps.size()));
   }
   Output out{
       split(Variable(windows)), PerGroup<LatentDistribution>(groups), PerGroup<Variable>(groups), {}, {}};
@@ -185,6 +152,13 @@ SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor
   const Prediction drawn = upsampler_.forward(concat_groups(z.span()), Variable(windows));  // of [N,G LD]
   out.picture = drawn.picture, out.predicted_error = drawn.predicted_error;  // [N,rows scale,columns scale,1]
   return out;
+}
+
+std::string text(const NetworkFormat& f) {
+  return std::to_string(f.frames) + " frame(s) of " + std::to_string(f.rows) + "x" +
+         std::to_string(f.columns) + " taxels with " + std::to_string(f.channels) +
+         " channel(s) and pictures of " + std::to_string(f.rows * f.scale) + "x" +
+         std::to_string(f.columns * f.scale);
 }
 
 NetworkFormat SuperTac::format() const {
@@ -201,7 +175,7 @@ Variable SuperTac::means(const Variable& windows) const {
 
 Tensor SuperTac::encode(const Tensor& windows) const {
   if (encoders_.empty())
-    throw std::invalid_argument("SuperTac: a model of single frames has no latents; choose one of windows");
+    refuse("SuperTac", "encode()", "a model of windows", "one of single frames, which has no latents");
   const NoGrad no_grad;
   return means(Variable(windows)).value();
 }

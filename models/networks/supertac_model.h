@@ -63,6 +63,8 @@ struct NetworkFormat {
   Dim frames = 1, rows = 4, columns = 4, channels = 1, scale = 4;
   bool operator==(const NetworkFormat&) const = default;
 };
+/// "32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 16x16", for messages.
+std::string text(const NetworkFormat& format);
 
 /// Pictures, with the predicted errors and latents of networks that have them.
 struct Estimate {
@@ -107,8 +109,7 @@ class Upsampler : public Module {
   Dim rows_, columns_, in_channels_;  // the map it starts from, and of the last frame
   std::optional<Linear> fc_;
   std::vector<Rirb> rirbs_;
-  Conv2d out_;
-  std::optional<Conv2d> predicted_error_, last_frame_;
+  std::optional<Conv2d> out_, predicted_error_, last_frame_;
 };
 
 /// Takes what WindowSet::window() gives, numbers in [0,1]. Pictures have no bounds; trained on plates they

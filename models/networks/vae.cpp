@@ -10,24 +10,22 @@ constexpr Dim kFeatures = 32;  // channels of the coarsest level
 constexpr Dim kHidden = 64;
 constexpr Dim kDownsampling = 16;
 
+// Channels from level to level; the encoder's first are those of the group.
+constexpr Dim kDown[] = {0, 16, kFeatures, kFeatures, kFeatures};
+constexpr Dim kUp[] = {kFeatures, kFeatures, kFeatures, 16, 16};
+
 constexpr ConvLayerOptions kHalve{.kernel = 3, .stride = 2, .padding = 1};
 constexpr ConvLayerOptions kDouble{.kernel = 4, .stride = 2, .padding = 1};
 
 }  // namespace
 
 Encoder::Encoder(const VaeOptions& o, Rng& rng)
-    : conv_{{o.channels, 16, kHalve, rng},
-            {16, kFeatures, kHalve, rng},
-            {kFeatures, kFeatures, kHalve, rng},
-            {kFeatures, kFeatures, kHalve, rng}},
-      fc_(kFeatures * (o.timesteps / kDownsampling), kHidden, rng),
-      mean_(kHidden, o.latent, rng),
-      log_var_(kHidden, o.latent, rng) {
-  for (std::size_t i = 0; i < conv_.size(); ++i) add("conv." + std::to_string(i), conv_[i]);
-  add("fc", fc_);
-  add("mean", mean_);
-  add("log_var", log_var_);
-}
+    : conv_(
+          add_each("conv", 4,
+                   [&](Dim i) { return Conv1d(i == 0 ? o.channels : kDown[i], kDown[i + 1], kHalve, rng); })),
+      fc_(add("fc", Linear(kFeatures * (o.timesteps / kDownsampling), kHidden, rng))),
+      mean_(add("mean", Linear(kHidden, o.latent, rng))),
+      log_var_(add("log_var", Linear(kHidden, o.latent, rng))) {}
 
 Variable Encoder::features(const Variable& x) const {
   Variable h = x;                                                    // [N,T,channels]
@@ -44,18 +42,10 @@ Variable Encoder::mean(const Variable& x) const { return mean_.forward(features(
 
 Decoder::Decoder(const VaeOptions& o, Rng& rng)
     : coarse_(o.timesteps / kDownsampling),
-      widen_(o.latent, kHidden, rng),
-      unfold_(kHidden, kFeatures * coarse_, rng),
-      conv_{{kFeatures, kFeatures, kDouble, rng},
-            {kFeatures, kFeatures, kDouble, rng},
-            {kFeatures, 16, kDouble, rng},
-            {16, 16, kDouble, rng}},
-      out_(16, o.channels, kSameSize, rng) {
-  add("fc.0", widen_);
-  add("fc.1", unfold_);
-  for (std::size_t i = 0; i < conv_.size(); ++i) add("conv." + std::to_string(i), conv_[i]);
-  add("out", out_);
-}
+      widen_(add("fc.0", Linear(o.latent, kHidden, rng))),
+      unfold_(add("fc.1", Linear(kHidden, kFeatures * coarse_, rng))),
+      conv_(add_each("conv", 4, [&](Dim i) { return ConvTranspose1d(kUp[i], kUp[i + 1], kDouble, rng); })),
+      out_(add("out", Conv1d(kUp[4], o.channels, kSameSize, rng))) {}
 
 Variable Decoder::forward(const Variable& z) const {
   const Dim pixels[] = {coarse_};

@@ -25,7 +25,6 @@
 #include "autograd/optimisers/adam.h"
 #include "data/windows/batching.h"
 #include "models/training/loss/collapse.h"
-#include "models/training/loss/schedule.h"
 #include "models/training/objective.h"
 #include "models/training/ranks.h"
 

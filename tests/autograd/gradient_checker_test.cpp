@@ -72,6 +72,9 @@ TEST(GradientChecker, FailsOnOneWrongElement) {
       << report.text();
   if (sizeof(real) == 8) {
     EXPECT_TRUE(report.text().starts_with("1 of 12 entries off by more than 1e-06\n")) << report.text();
+    const std::string text = report.text(), second = text.substr(text.find("input 0 [1,3]"));
+    EXPECT_FALSE(second.substr(0, second.find('\n')).ends_with(" (right)")) << text;
+    EXPECT_TRUE(text.ends_with(" (right)\n")) << text;
   }
   EXPECT_EQ(checked(f, {test::numbers({3, 4})}, {.names = {"mean"}}).worst[0].place, "mean [1,3] of [3,4]");
   EXPECT_EQ(checked(f, {test::numbers({12})}).worst[0].place, "input 0 [7] of [12]");

@@ -23,6 +23,44 @@ TEST(OpGradients, AnInputHasTheSameOneWhereAllOthersAreConstants) {
   }
 }
 
+// Of no rows, or of an empty Variable. Weights and biases keep their sizes.
+TEST(OpGradients, OfNoRowsAreEmptyOrAllZero) {
+  std::size_t refused = 0;
+  for (const GradientCase& c : op_cases()) {
+    std::vector<Variable> leaves;
+    for (std::size_t i = 0; i < c.leaves.size(); ++i) {
+      const std::span<const Dim> dims = c.leaves[i].shape().dims();
+      std::vector<Dim> none(dims.begin(), dims.end());
+      const std::string& name = c.options.names[i];
+      if (!name.ends_with(" weight") && !name.ends_with(" bias")) none[0] = 0;
+      leaves.emplace_back(Tensor::zeros(Shape(none)), true);
+    }
+    try {
+      backward(sum(c.of(leaves)));
+    } catch (const std::invalid_argument&) {  // a mean of nothing, or a constant of other rows
+      ++refused;
+      continue;
+    }
+    for (const Variable& leaf : leaves) {
+      ASSERT_EQ(leaf.grad().shape(), leaf.shape()) << c.name;
+      for (const real g : leaf.grad().values()) ASSERT_EQ(g, 0) << c.name;
+    }
+  }
+  EXPECT_LT(refused, op_cases().size() / 4);
+}
+
+TEST(OpGradients, AnEmptyVariableIsRefusedByName) {
+  for (const GradientCase& c : op_cases())
+    for (std::size_t i = 0; i < c.leaves.size(); ++i) {
+      std::vector<Variable> leaves = c.leaves;
+      leaves[i] = Variable();
+      const std::string said = what_of<std::invalid_argument>([&] { c.of(leaves); });
+      EXPECT_TRUE(said.starts_with(c.name + ": ")) << said;
+      EXPECT_TRUE(said.ends_with(" expects a value, got an empty Variable"))
+          << c.options.names[i] << ", " << said;
+    }
+}
+
 // Spoils what the reverse step of an op adds to the gradient of one input.
 struct Planted : ReverseWatch {
   enum Kind { sign, twice, index };

@@ -14,8 +14,8 @@ project(user LANGUAGES C CXX)
 find_package(supertac REQUIRED)
 add_executable(draw_live $source/examples/draw_live.c)
 target_link_libraries(draw_live PRIVATE supertac::c)
-add_executable(fit_a_sine $source/examples/fit_a_sine.cpp)
-target_link_libraries(fit_a_sine PRIVATE supertac::supertac_loss)
+add_executable(vae $source/examples/vae.cpp)
+target_link_libraries(vae PRIVATE supertac::supertac_layers supertac::supertac_images)
 EOF
 try() { # NAME LIBDIR INCLUDEDIR
   name=$1 libdir=$2 includedir=$3 here=$folder/$1
@@ -34,7 +34,7 @@ try() { # NAME LIBDIR INCLUDEDIR
   # shellcheck disable=SC2046  # flags are words
   cc -std=c99 "$source/examples/draw_live.c" -o "$here/draw_live" $(pkg-config --cflags --libs supertac)
   # shellcheck disable=SC2046
-  c++ -std=c++20 "$source/examples/fit_a_sine.cpp" -o "$here/fit_a_sine" $(pkg-config --cflags --libs supertac-cpp)
+  c++ -std=c++20 "$source/examples/vae.cpp" -o "$here/vae" $(pkg-config --cflags --libs supertac-cpp)
   cmake -S "$folder/user" -B "$here/user" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" -Dsupertac_DIR="$lib/cmake/supertac" \
     >> "$here.log"
   cmake --build "$here/user" >> "$here.log"
@@ -42,8 +42,9 @@ try() { # NAME LIBDIR INCLUDEDIR
     "$program" missing.safetensors 100 < /dev/null 2> "$here/said" && exit 1
     grep -q missing.safetensors "$here/said"
   done
-  "$here/fit_a_sine" | grep -q "step 2000  loss 0.0001"
-  "$here/user/fit_a_sine" | grep -q "step 2000  loss 0.0001"
+  for program in "$here/vae" "$here/user/vae"; do
+    "$program" "$here/vae.png" | grep -q "never seen: squared error 0[.]001"
+  done
   echo "$name: linked"
   rm -rf "$here"
 }

@@ -47,16 +47,6 @@ struct PlacesJob {
 /// Taps of a 3x3 filter along one axis: all, or all but the last or the first, which is 0.
 enum class Taps { three, first_two, last_two };
 
-/// PlacesJob for a few tiles of 4x4, from the filters themselves: u = G g G^T is computed on the way, for as
-/// many rows of cin as the first-level cache holds. Tap (i, j), where there is one, is g[taps[i, j] + k], k <
-/// cin * cout. Only the places of m where u is not all 0 are written. v and m have [6][6] places.
-struct FilteredPlacesJob {
-  Taps down = Taps::three, across = Taps::three;
-  const Dim* taps = nullptr;
-  Dim tiles = 0, cin = 0, cout = 0;  // multiples of kTransformChannels and of kFilterChannels
-};
-inline constexpr Dim kFilterChannels = 32;
-
 /// `gate`: y[pixel, c] = a[pixel, c] + x[pixel, c] * gates[image, c], or a + x where gates is null; `mean`:
 /// means[image, c] = the mean over pixels of x.
 struct MapJob {

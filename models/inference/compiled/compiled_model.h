@@ -1,9 +1,11 @@
 // A network that was compiled for drawing many pictures. Its forward pass is traced once (autograd/trace.h)
 // and becomes a list of steps on planned memory. The weights are packed and transformed once, nothing is
-// recorded on a graph, and a warm call neither takes memory from the heap nor waits for a lock.
+// recorded on a graph, and a warm call neither takes memory from the heap nor waits for a lock. And several
+// of them that draw one picture.
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "models/inference/compiled/ranges.h"
 #include "models/networks/supertac_model.h"
@@ -36,6 +38,26 @@ class CompiledModel {
   const SuperTac* network_;
   std::shared_ptr<const Plan> plan_;
   std::shared_ptr<const IntegerPlan> integers_;  // instead
+};
+
+/// Several networks that draw one picture, the mean of theirs: where the signals leave the picture open,
+/// networks of different seeds mostly err differently, which averages out (Lakshminarayanan et al. 2017).
+/// Costs as much as all of them. The networks must outlive it.
+class Ensemble {
+ public:
+  /// Throws std::invalid_argument when there is none, or when they differ in the inputs that they take or in
+  /// the pictures that they draw.
+  explicit Ensemble(std::vector<CompiledModel> members);
+
+  const SuperTac& first() const { return members_.front().network(); }
+  /// The members' pictures are added in their order. predicted_error^2 is the mean of their predicted_error^2
+  /// plus the variance of their pictures, the latents are those of the first. Throws as
+  /// SuperTac::estimate, and std::invalid_argument when some predict their error and others do not.
+  Estimate estimate(const Tensor& inputs) const;
+  Tensor infer(const Tensor& inputs) const { return estimate(inputs).picture; }
+
+ private:
+  std::vector<CompiledModel> members_;
 };
 
 }  // namespace supertac

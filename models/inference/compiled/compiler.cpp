@@ -1,35 +1,15 @@
 #include "models/inference/compiled/compiler.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <stdexcept>
 
 namespace supertac {
 
-std::size_t Compiler::second_cache_bytes() {
-#ifdef _SC_LEVEL2_CACHE_SIZE
-  return static_cast<std::size_t>(std::max(0L, sysconf(_SC_LEVEL2_CACHE_SIZE)));
-#else
-  return 0;
-#endif
-}
-
-// A picture alone meets each weight once. Where the second cache holds all weights from one picture to the
-// next, but not their transforms too, transforming them on the way costs less than fetching them from the
-// third: .65 of the time of `paper` with 2 MB.
-bool Compiler::filters_anew(std::size_t second_cache) const {
-  const auto maps = static_cast<std::size_t>(plan_->workspace_ + plan_->scratch_) * sizeof(real);
-  return weights_ + maps <= second_cache && weights_ + transformed_ + maps > second_cache;
-}
-
-std::shared_ptr<const Plan> Compiler::plan(const SuperTac& network, std::size_t second_cache) {
+std::shared_ptr<const Plan> Compiler::plan(const SuperTac& network) {
   const TracedPrediction traced(network, Tensor::zeros(network.input_shape(1)));
   const Prediction& drawn = traced.drawn;
   Compiler compiler(traced);
   Plan& plan = *compiler.plan_;
-  if (second_cache >= Plan::kLargeCache) plan.block_ = Plan::kLargeBlock;
-  plan.filters_anew_ = compiler.filters_anew(second_cache);
   plan.picture_ = compiler.map_of(drawn.picture);
   if (drawn.predicted_error.defined()) plan.predicted_error_ = compiler.map_of(drawn.predicted_error);
   if (drawn.latents.defined()) plan.latents_ = compiler.map_of(drawn.latents);
@@ -105,13 +85,13 @@ Estimate Plan::run(const Tensor& inputs) const {
                .latents = {}};
   if (predicted_error_) out.predicted_error = Tensor(out.picture.shape());
   if (latents_) out.latents = Tensor(Shape{count, latents_->channels});
-  const Dim images = std::min(count, block_);
+  const Dim images = std::min(count, kBlock);
   Tensor memory(Shape{scratch_ + workspace_ * images});
   real* const workspace = memory.data() + scratch_;
-  for (Dim first = 0; first < count; first += block_) {
-    const Block block{inputs.data() + first * size, std::min(block_, count - first), workspace, memory.data(),
-                      filters_anew_};
-    if (first == 0 || block.images != block_) clear_margins(block);
+  for (Dim first = 0; first < count; first += kBlock) {
+    const Block block{inputs.data() + first * size, std::min(kBlock, count - first), workspace,
+                      memory.data()};
+    if (first == 0 || block.images != kBlock) clear_margins(block);
     for (const PlanStep& step : steps_) step(block);
     copy_out(block, picture_, out.picture, first);
     if (predicted_error_) copy_out(block, *predicted_error_, out.predicted_error, first);

@@ -25,8 +25,7 @@ struct Block {
   const real* input = nullptr;
   Dim images = 0;
   real* workspace = nullptr;
-  real* scratch = nullptr;    ///< of the step that runs
-  bool filters_anew = false;  ///< Winograd's filters are transformed on the way
+  real* scratch = nullptr;  ///< of the step that runs
 
   real* begin(const FeatureMap& map) const { return workspace + map.offset * images; }
   real* first_pixel(const FeatureMap& map) const { return begin(map) + map.origin(); }
@@ -34,11 +33,12 @@ struct Block {
 
 using PlanStep = std::function<void(const Block&)>;
 
+/// What runs: the steps of a network, and where its maps lie. The steps hold their weights. Memory is planned
+/// for one image; a block of n images has n of each map, one behind the other, and every run takes its own.
 class Plan {
  public:
+  /// inputs as SuperTac::estimate(), which is not checked.
   Estimate run(const Tensor& inputs) const;
-  /// Whether few pictures have Winograd's filters transformed on the way: the same bits from less memory.
-  bool filters_anew() const { return filters_anew_; }
 
  private:
   friend class Compiler;
@@ -46,31 +46,26 @@ class Plan {
   void clear_margins(const Block& block) const;
   void copy_out(const Block& block, const FeatureMap& map, Tensor& to, Dim first) const;
 
-  /// Images that go through the steps together. They share the weights on their way from memory, but what
-  /// they leave behind must stay in the second cache: one of kLargeCache bytes has room for kLargeBlock.
-  static constexpr Dim kBlock = 8, kLargeBlock = 16;
-  static constexpr std::size_t kLargeCache = std::size_t{2} << 20;
+  /// Images that go through the steps together: they share the weights on their way from memory, but what
+  /// they leave behind must stay in the second cache.
+  static constexpr Dim kBlock = 8;
 
   std::vector<PlanStep> steps_;
   std::vector<FeatureMap> buffers_;  // each once
   std::vector<FeatureMap> planes_;   // those with margins inside: of one image, channel by channel
-  Dim workspace_ = 0;                // numbers of an image
-  Dim scratch_ = 0;                  // numbers
+  Dim workspace_ = 0;                // numbers of an image, in all maps
+  Dim scratch_ = 0;                  // numbers, of the step that needs the most
   FeatureMap picture_;
   std::optional<FeatureMap> predicted_error_, latents_;
-  Dim block_ = kBlock;
-  bool filters_anew_ = false;
 };
 
 /// One step for each op, in the order in which they ran; a map's memory is reused behind its last reader.
 class Compiler : TraceWalk {
  public:
-  /// Throws std::logic_error naming an op that has no step. `second_cache`: of the processor, in bytes; 0:
-  /// not known.
-  static std::shared_ptr<const Plan> plan(const SuperTac& network,
-                                          std::size_t second_cache = second_cache_bytes());
+  /// Throws std::logic_error naming an op that has no step.
+  static std::shared_ptr<const Plan> plan(const SuperTac& network);
 
-  // For the steps.
+  // For the steps: where x lies, and a place for y in memory that no later op reads.
   const FeatureMap& map_of(const Variable& x) const;
   const FeatureMap& new_map(const Variable& y);
   void add_step(PlanStep step) { plan_->steps_.push_back(std::move(step)); }
@@ -78,9 +73,6 @@ class Compiler : TraceWalk {
  private:
   using Make = void (*)(Compiler&, const TracedOp&);
 
-  static std::size_t second_cache_bytes();
-  static std::size_t bytes_of(const Tensor& t) { return static_cast<std::size_t>(t.size()) * sizeof(real); }
-  bool filters_anew(std::size_t second_cache) const;
   explicit Compiler(const TracedPrediction& traced);
   /// In plan_steps.cpp: what makes the step of each op.
   static const std::map<std::string_view, Make>& makers();
@@ -98,7 +90,6 @@ class Compiler : TraceWalk {
   std::shared_ptr<Plan> plan_ = std::make_shared<Plan>();
   std::map<Id, FeatureMap> maps_;
   std::vector<FeatureMap> free_;
-  std::size_t weights_ = 0, transformed_ = 0;  // bytes: as they are, and Winograd's places of some of them
 };
 
 }  // namespace supertac

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "models/inference/compiled/compiled_model.h"
-#include "models/inference/compiled/quantise.h"
 #include "models/inference/compiled/ranges.h"
 #include "models/inference/compiled/taps.h"
 #include "models/networks/supertac_model.h"
@@ -24,6 +23,24 @@ struct IntegerMap : FeatureMap {
   Scale scale;
 
   Dim size() const { return image() * (bytes ? 1 : 2); }  // bytes
+};
+
+/// Sums of a product: s[o] = sum over k of x[k] * w[k, o], where x are whole numbers of scale `from`, become
+///   v[o] = (s[o] * multiplier[o] + offset[o]) >> shift[o]
+/// in steps of `to`, zero not yet added. A weight's step is chosen so that multiplier / 2^shift is exact:
+///   w = q * step_w[o],   step_w[o] = multiplier[o] / 2^shift[o] * to.step / from.step,   |q| <= 127
+/// The multiplier has six bits, so that for sums of bytes nothing overflows 32 bits, in vectors or on a
+/// microcontroller; of sums of 16-bit numbers the product takes 64.
+struct QuantisedProduct {
+  Dim rows = 0, outputs = 0;
+  std::vector<std::int8_t> w;  // [rows][outputs]
+  std::vector<std::int32_t> multiplier, offset, shift;
+};
+
+/// From numbers of one scale, up to 16 bits, to another one: ((x * multiplier + offset) >> shift) + zero of
+/// the other one.
+struct Requantise {
+  std::int32_t multiplier = 1, offset = 0, shift = 0;
 };
 
 struct IntegerStep {

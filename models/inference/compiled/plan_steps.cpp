@@ -100,7 +100,6 @@ struct Product {
 void Compiler::product(const TracedOp& op) {
   const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   for (ProductTaps& taps : products_of(op, x, y)) {
-    weights_ += bytes_of(taps.w);
     const kernels::ProductJob job{.height = taps.height,
                                   .width = taps.width,
                                   .from = taps.from,

@@ -8,17 +8,17 @@ namespace supertac {
 
 using kernels::ConvSettings;
 using kernels::place_step;
-using kernels::Taps;
 
 constexpr Dim kTilesAtOnce = 8;
-constexpr Dim kFewTiles = 4;  // whose filters may be transformed on the way
+
+// Taps of a 3x3 filter along one axis: all, or all but the last or the first, which is 0.
+enum class Taps { three, first_two, last_two };
 
 // A 3x3 convolution from the places of a map to every pixel of another, or to every second one.
 struct Filters {
   Taps down = Taps::three, across = Taps::three;
-  std::vector<Dim> taps;  // those that are there, from the first weight
-  Dim y_offset = 0;       // from the map's first pixel
-  Tensor u = {};          // [side(down)][side(across)][place]
+  Dim y_offset = 0;  // from the map's first pixel
+  Tensor u = {};     // [side(down)][side(across)][place]
 
   static Dim first(Taps t) { return t == Taps::last_two ? 1 : 0; }  // of the taps, and of the places
   static Dim count(Taps t) { return t == Taps::three ? 3 : 2; }
@@ -26,7 +26,7 @@ struct Filters {
 
 struct Winograd {
   kernels::MapTileJob from, to;
-  Tensor w, bias;
+  Tensor bias;
   Dim place = 0;  // numbers from one place of u to the next
   real negative_slope = 1;
   FeatureMap x, y;
@@ -34,19 +34,19 @@ struct Winograd {
 
   Dim side() const { return from.square + 2; }
   Dim side(Taps t) const { return t == Taps::three ? side() : side() - 1; }
-  bool can_transform_anew() const { return from.square == 4 && to.channels % kernels::kFilterChannels == 0; }
   /// Of v, and of m behind it.
   Dim places(Dim channels) const { return side() * side() * place_step(kTilesAtOnce, channels); }
   Dim scratch() const { return places(from.channels) + places(to.channels); }
-  void add(Filters f);
-  void multiply(const Filters& f, bool anew, Dim tiles, const real* v, real* m) const;
+  void add(Filters f, const Tensor& w, const std::vector<Dim>& taps);
+  void multiply(const Filters& f, Dim tiles, const real* v, real* m) const;
   void operator()(const Block& block) const;
 };
 
-void Winograd::add(Filters f) {
+// `taps`: where in w those of the filter begin that are there, row by row.
+void Winograd::add(Filters f, const Tensor& w, const std::vector<Dim>& taps) {
   const Dim size = from.channels * to.channels;
   Tensor square = Tensor::zeros(Shape{3, 3, size}), all(Shape{side() * side(), place});
-  const auto* tap = f.taps.data();
+  const auto* tap = taps.data();
   for (Dim i = 0; i < Filters::count(f.down); ++i) {
     for (Dim j = 0; j < Filters::count(f.across); ++j)
       std::copy_n(w.data() + *tap++, size,
@@ -61,15 +61,12 @@ void Winograd::add(Filters f) {
 }
 
 // Fills m with the products of the places v of so many tiles.
-void Winograd::multiply(const Filters& f, bool anew, Dim tiles, const real* v, real* m) const {
+void Winograd::multiply(const Filters& f, Dim tiles, const real* v, real* m) const {
   const auto& set = isa();
   const Dim down = side(f.down), across = side(f.across);
   const Dim v_step = place_step(tiles, from.channels), m_step = place_step(tiles, to.channels);
   const bool whole = down == side() && across == side();
   if (!whole) std::fill_n(m, side() * side() * m_step, real(0));
-  if (anew)
-    return set.filtered_places({f.down, f.across, f.taps.data(), tiles, from.channels, to.channels}, v,
-                               w.data(), m);
   const Dim runs = whole ? 1 : down, run = down * across / runs;
   for (Dim r = 0; r < runs; ++r) {
     const Dim at = (Filters::first(f.down) + r) * side() + Filters::first(f.across);
@@ -81,7 +78,6 @@ void Winograd::multiply(const Filters& f, bool anew, Dim tiles, const real* v, r
 void Winograd::operator()(const Block& block) const {
   const auto& set = isa();
   const Dim tiles = block.images * from.tiles_down * from.tiles_across;
-  const bool anew = block.filters_anew && can_transform_anew() && tiles <= kFewTiles;
   real* const v = block.scratch;
   real* const m = v + places(from.channels);
   for (Dim first = 0; first < tiles; first += kTilesAtOnce) {
@@ -91,7 +87,7 @@ void Winograd::operator()(const Block& block) const {
     in.step = place_step(in.count, in.channels), out.step = place_step(out.count, out.channels);
     set.map_patches(in, block.first_pixel(x) - x.line() - x.channels, v);
     for (const Filters& f : filters) {
-      multiply(f, anew, in.count, v, m);
+      multiply(f, in.count, v, m);
       set.map_squares(out, m, bias.data(), negative_slope, block.first_pixel(y) + f.y_offset);
     }
   }
@@ -107,7 +103,6 @@ Winograd winograd_step(const TracedOp& op, const FeatureMap& x, const FeatureMap
   const Dim square = square_of(x), down = x.height / square, across = x.width / square;
   return {.from = {down, across, x.strides(), x.channels, square},
           .to = {down, across, to, y.channels, square},
-          .w = op.inputs[1].value().clone(),
           .bias = op.inputs[2].value().clone(),
           .place = x.channels * y.channels + kPadding,
           .negative_slope = op.settings.negative_slope,
@@ -162,10 +157,6 @@ void Compiler::transposed_conv(const TracedOp& op) {
 }
 
 void Compiler::add_winograd(Winograd step) {
-  const bool either = step.can_transform_anew();
-  if (!either) step.w = {};
-  if (either) weights_ += bytes_of(step.w);
-  for (const Filters& f : step.filters) (either ? transformed_ : weights_) += bytes_of(f.u);
   plan_->scratch_ = std::max(plan_->scratch_, step.scratch());
   add_step(std::move(step));
 }
@@ -173,9 +164,9 @@ void Compiler::add_winograd(Winograd step) {
 void Compiler::winograd(const TracedOp& op) {
   const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   Winograd step = winograd_step(op, x, y, y.strides());
-  Filters all;
-  for (Dim tap = 0; tap < 9; ++tap) all.taps.push_back(tap * x.channels * y.channels);
-  step.add(std::move(all));
+  std::vector<Dim> taps;
+  for (Dim tap = 0; tap < 9; ++tap) taps.push_back(tap * x.channels * y.channels);
+  step.add({}, op.inputs[1].value(), taps);
   add_winograd(std::move(step));
 }
 
@@ -188,8 +179,8 @@ void Compiler::transposed_winograd(const TracedOp& op) {
   constexpr Taps kTaps[] = {Taps::first_two, Taps::last_two};
   for (Dim top = 0; top < 2; ++top) {
     for (Dim left = 0; left < 2; ++left)
-      step.add({kTaps[top], kTaps[left], quarter_taps(top, left, x.channels * y.channels),
-                top * y.line() + left * y.channels});
+      step.add({kTaps[top], kTaps[left], top * y.line() + left * y.channels}, op.inputs[1].value(),
+               quarter_taps(top, left, x.channels * y.channels));
   }
   add_winograd(std::move(step));
 }

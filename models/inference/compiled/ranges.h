@@ -2,15 +2,22 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "layers/checkpoint.h"
-#include "models/inference/compiled/quantise.h"
 #include "models/networks/supertac_model.h"
 
 namespace supertac {
+
+/// How whole numbers q stand for values: value = (q - zero) * step, |q| <= largest.
+struct Scale {
+  double step = 1;
+  std::int32_t zero = 0;
+  std::int32_t largest = 255;
+};
 
 /// Smallest and largest value of each op of an inference, in their order, over the inputs that were added.
 class ActivationRanges {

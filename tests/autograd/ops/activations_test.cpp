@@ -58,15 +58,6 @@ TEST(Activations, MinusInfinityIsRectifiedToZero) {
   }
 }
 
-TEST(Activations, Empty) {
-  const Variable x = parameter(Tensor::zeros({0, 4}));
-  for (const Variable& y : {relu(x), leaky_relu(x), sigmoid(x), clamp(x, -1, 1)}) {
-    EXPECT_EQ(y.size(), 0);
-    backward(sum(y));
-    EXPECT_EQ(x.grad().shape().text(), "[0,4]");
-  }
-}
-
 TEST(Activations, RefusesBadSettings) {
   const Variable x(Tensor::zeros({1}));
   EXPECT_REFUSAL("leaky_relu: negative_slope expects 0 or more, got -0.500000", leaky_relu(x, real(-0.5)));

@@ -29,13 +29,6 @@ TEST(Arithmetic, SumOfManyKeepsItsDigits) {
   EXPECT_NEAR(static_cast<double>(sum(Variable(Tensor::full({n}, real(0.1)))).item()), 100000.3, 0.01);
 }
 
-TEST(Arithmetic, Empty) {
-  const Variable x = parameter(Tensor::zeros({0, 3}));
-  EXPECT_EQ((x + x).shape().text(), "[0,3]");
-  backward(sum(2 * x * x));
-  EXPECT_EQ(sum(x).item(), 0);
-}
-
 TEST(Arithmetic, RefusesOtherShapes) {
   const Variable a(Tensor::zeros({2, 3})), b(Tensor::zeros({3, 2}));
   EXPECT_REFUSAL("add: b expects the shape of a, [2,3], got [3,2]", a + b);

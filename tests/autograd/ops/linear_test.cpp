@@ -14,17 +14,6 @@ TEST(Linear, HandComputed) {
   EXPECT_VALUES(linear(x, w, b).value(), {2, 3}, {15, 22, 29, 21, 24, 27});
 }
 
-TEST(Linear, Empty) {
-  const Variable x = parameter(Tensor::zeros({0, 4})), w = parameter(numbers({4, 2})),
-                 b = parameter(numbers({2}));
-  const Variable y = linear(x, w, b);
-  EXPECT_EQ(y.shape().text(), "[0,2]");
-  backward(sum(y));
-  EXPECT_EQ(x.grad().shape().text(), "[0,4]");
-  EXPECT_TRUE(same_bytes(w.grad(), Tensor::zeros({4, 2})));
-  EXPECT_TRUE(same_bytes(b.grad(), Tensor::zeros({2})));
-}
-
 TEST(Linear, RefusesOtherShapes) {
   const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
   EXPECT_REFUSAL("linear: x expects a value, got an empty Variable",

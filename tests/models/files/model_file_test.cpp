@@ -91,7 +91,7 @@ TEST(ModelFile, TheFileNeverSizesAnything) {
   EXPECT_EQ(load_error(path), "nothing thrown");
   const struct {
     std::string settings, input, refusal;
-  } cases[] = {{settings("1000000", "3"), input, "timesteps must be 32 to 512, got 1000000"},
+  } cases[] = {{settings("1000000", "3"), input, "timesteps expects 32 to 512, got 1000000"},
                {settings("32", "1e300"), input, "\"latent\" must be a whole number"},
                {settings("32", "4"), input, "encoder.0.mean.weight expected F32 [4,64], found F32 [3,64]"},
                {"[[[[", input, "metadata \"settings\""},

@@ -1,4 +1,4 @@
-#include "models/inference/ensemble.h"
+#include "models/inference/compiled/compiled_model.h"
 
 #include "tests/models/support.h"
 #include "tests/support/test.h"

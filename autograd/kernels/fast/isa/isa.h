@@ -83,7 +83,6 @@ struct IsaKernels {
   void (*product)(const ProductJob& job, const real* x, real* y) = nullptr;
   void (*map_patches)(const MapTileJob& job, const real* x, real* places) = nullptr;
   void (*places)(const PlacesJob& job, const real* v, const real* u, real* m) = nullptr;
-  void (*filtered_places)(const FilteredPlacesJob& job, const real* v, const real* g, real* m) = nullptr;
   void (*map_squares)(const MapTileJob& job, const real* places, const real* bias, real negative_slope,
                       real* y) = nullptr;
   void (*gate)(const MapJob& job, const real* a, const real* x, const real* gates, real* y) = nullptr;

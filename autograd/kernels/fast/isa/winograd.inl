@@ -1,13 +1,13 @@
 // Winograd's transforms (winograd.cpp), over the same vector type as kernels.inl and included behind it.
 
 // For the points 0, 1, -1, 2, -2 and infinity, one dimension of each; both_ways() applies them to rows, then
-// columns. kFirst: the first place.
+// columns.
 ALWAYS_INLINE Vec times(double factor, Vec v) {
   return Vec::fma(Vec::broadcast(static_cast<real>(factor)), v, Vec::broadcast(0));
 }
 
 struct FilterTransform {  // G
-  static constexpr int kIn = 3, kOut = 6, kFirst = 0;
+  static constexpr int kIn = 3, kOut = 6;
   ALWAYS_INLINE static void run(const Vec (&g)[3], Vec (&to)[6]) {
     const Vec ends = Vec::add(g[0], g[2]), middle = times(1.0 / 12, g[1]);
     const Vec far = Vec::fma(Vec::broadcast(real(1.0 / 24)), g[0], times(1.0 / 6, g[2]));
@@ -17,29 +17,6 @@ struct FilterTransform {  // G
     to[3] = Vec::add(far, middle);
     to[4] = Vec::sub(far, middle);
     to[5] = g[2];
-  }
-};
-// G of filters whose last or first tap is 0: without the place that is 0 too, which is the last or the first.
-struct FirstTwoTapsTransform {
-  static constexpr int kIn = 2, kOut = 5, kFirst = 0;
-  ALWAYS_INLINE static void run(const Vec (&g)[2], Vec (&to)[5]) {
-    const Vec middle = times(1.0 / 12, g[1]), far = times(1.0 / 24, g[0]);
-    to[0] = times(0.25, g[0]);
-    to[1] = times(-1.0 / 6, Vec::add(g[0], g[1]));
-    to[2] = times(-1.0 / 6, Vec::sub(g[0], g[1]));
-    to[3] = Vec::add(far, middle);
-    to[4] = Vec::sub(far, middle);
-  }
-};
-struct LastTwoTapsTransform {
-  static constexpr int kIn = 2, kOut = 5, kFirst = 1;
-  ALWAYS_INLINE static void run(const Vec (&g)[2], Vec (&to)[5]) {
-    const Vec middle = times(1.0 / 12, g[0]), far = times(1.0 / 6, g[1]);
-    to[0] = times(-1.0 / 6, Vec::add(g[1], g[0]));
-    to[1] = times(-1.0 / 6, Vec::sub(g[1], g[0]));
-    to[2] = Vec::add(far, middle);
-    to[3] = Vec::sub(far, middle);
-    to[4] = g[1];
   }
 };
 struct FilterGradTransform {  // G^T

@@ -120,32 +120,6 @@ TEST_P(CompiledBits, AreOneForBatchesInstructionSetsAndThreads) {
 INSTANTIATE_TEST_SUITE_P(All, CompiledBits,
                          testing::Combine(testing::Values("paper", "tiny"), testing::Bool()));
 
-// On the second cache depend how many pictures are drawn at once and whether few have their filters
-// transformed on the way.
-TEST(CompiledModel, OfAnyCacheHasTheSameBits) {
-  const SuperTac network = random_network(SuperTacSettings::of_preset("paper"), 4);
-  const kernels::IsaKernels& before = isa_kernels();
-  std::set<bool> seen;
-  for (const Dim count : {1, 2, 3, 17}) {
-    const Tensor windows = uniform(network.input_shape(count), 6);
-    const Estimate expected = Compiler::plan(network, 0)->run(windows);
-    for (const std::size_t megabytes : {1, 2, 3, 4, 64})
-      for (const kernels::IsaKernels* set : supported_sets()) {
-        if (set == &kernels::kPlainKernels || (set == &kernels::kPortableKernels && count > 1)) continue;
-        use_isa(*set);
-        const auto plan = Compiler::plan(network, megabytes << 20);
-        seen.insert(plan->filters_anew());
-        const Estimate found = plan->run(windows);
-        const std::string what = std::to_string(megabytes) + " MB, " + std::string(set->name);
-        EXPECT_TRUE(std::ranges::equal(expected.picture.values(), found.picture.values())) << what;
-        EXPECT_TRUE(std::ranges::equal(expected.predicted_error.values(), found.predicted_error.values()))
-            << what;
-      }
-  }
-  use_isa(before);
-  EXPECT_EQ(seen.size(), 2U);
-}
-
 TEST(CompiledModel, InBytesDrawsNearlyTheSame) {
   for (std::uint64_t seed = 0; seed < 12; ++seed) {
     const SuperTac network = random_network(random_settings(seed), seed);

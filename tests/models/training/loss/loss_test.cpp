@@ -2,7 +2,6 @@
 
 #include "autograd/ops/losses.h"
 #include "models/training/loss/collapse.h"
-#include "models/training/loss/schedule.h"
 #include "tests/models/support.h"
 #include "tests/support/test.h"
 
