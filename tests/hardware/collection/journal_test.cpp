@@ -142,7 +142,8 @@ TEST(Journal, AFullDiskIsReportedAndWhatWasWrittenIsKept) {
   EXPECT_EQ(read_journal(folder / "j").header, "h");
 }
 
-// How much of the newest a kill costs is in bench/results/rig/kill.csv. What was written is a whole beginning.
+// How much of the newest a kill costs is in bench/results/rig/kill.csv. What was written is a whole
+// beginning.
 TEST(Journal, WhatIsAppendedReachesTheFileByItselfAndAKillLeavesAWholeBeginning) {
   const TemporaryFolder folder;
   for (std::uintmax_t round = 1; round <= 6; ++round) {
