@@ -8,7 +8,7 @@
 
 #include "apps/web/web_server.h"
 #include "io/numbers/clock.h"
-#include "tests/apps/hostile/liars.h"
+#include "tests/apps/hostile/hostile.h"
 #include "tests/apps/web/http_client.h"
 #include "tests/hardware/fault_run.h"
 #include "tests/hardware/rig_support.h"
@@ -18,47 +18,38 @@ namespace {
 
 /// A printer's port that says something else than the printer did, from line to line or, once it begins, for
 /// ever.
-class LyingPort : public Port {
+class LyingPort : public WrappedPort {
  public:
   LyingPort(std::unique_ptr<Port> inner, std::uint64_t seed)
-      : inner_(std::move(inner)),
+      : WrappedPort(std::move(inner)),
         dice_(seed, 77),
         kind_(dice_.below(kKinds)),
         rate_(0.002 + 0.02 * dice_.uniform()),
         from_line_(dice_.below(400)) {}
 
   static std::uint32_t kind_of(std::uint64_t seed) { return Dice(seed, 77).below(kKinds); }
-  const std::string& name() const override { return inner_->name(); }
-  double now() override { return inner_->now(); }
-  double write(std::span<const std::byte> bytes, double until) override {
-    return inner_->write(bytes, until);
-  }
-
   Received read(std::span<std::byte> buffer, double until) override {
-    while (out_.empty()) {
+    while (said_.empty()) {
       const double next = for_ever() ? std::min(until, said_s_ + 1) : until;
       std::array<std::byte, 1024> raw{};
       const Received got = inner_->read(raw, next);
       for (std::size_t i = 0; i < got.count; ++i) take(std::to_integer<char>(raw[i]));
-      time_ = got.time_s;
-      if (for_ever() && time_ >= said_s_ + 1)
+      now_ = got.time_s;
+      if (for_ever() && now_ >= said_s_ + 1)
         say(kind_ == 0   ? "echo:busy: processing"
             : kind_ == 1 ? "Resend: 2\nok"
                          : "// still at it"),
-            said_s_ = time_;
-      if (out_.empty() && time_ >= until) return {0, time_};
+            said_s_ = now_;
+      if (said_.empty() && now_ >= until) return {0, now_};
     }
-    const std::size_t count = std::min(buffer.size(), out_.size());
-    std::copy_n(std::as_bytes(std::span(out_)).begin(), count, buffer.begin());
-    out_.erase(0, count);
-    return {count, time_};
+    return hand_on(buffer);
   }
 
  private:
   static constexpr std::uint32_t kKinds = 22;
   // Kinds 0 to 3: from some line on nothing but this.
   bool for_ever() const { return kind_ < 4 && lines_ > from_line_; }
-  void say(const std::string& line) { out_ += line + "\n"; }
+  void say(const std::string& line) { said_ += line + "\n"; }
 
   void take(char c) {
     line_ += c;
@@ -70,7 +61,7 @@ class LyingPort : public Port {
     }
     const bool lies = kind_ >= 4 && dice_.hit(rate_);
     if (lies) lie();
-    if (!(lies && kind_ == 4)) out_ += line_;
+    if (!(lies && kind_ == 4)) said_ += line_;
     line_.clear();
   }
 
@@ -96,16 +87,15 @@ class LyingPort : public Port {
         "echo:Soft endstops: ON  Min: X0.00 Y0.00 Z0.00  Max: X1.00 Y1.00 Z1.00",
         "//action:" + std::string(dice_.hit(0.5) ? "pause" : "cancel"),
         std::string(5000, 'x')};
-    if (kind_ - 4 < std::size(said)) out_ += said[kind_ - 4] + (kind_ == 4 ? "" : "\n");
+    if (kind_ - 4 < std::size(said)) said_ += said[kind_ - 4] + (kind_ == 4 ? "" : "\n");
   }
 
-  std::unique_ptr<Port> inner_;
   Dice dice_;
   std::uint32_t kind_;
   double rate_;
   std::uint32_t from_line_, lines_ = 0;
-  std::string line_, out_;
-  double time_ = 0, said_s_ = 0;
+  std::string line_;
+  double said_s_ = 0;
 };
 
 /// Stop on a page among up to 300 tabs that listen, sleep, break off, or say half of something. Returns what
@@ -143,8 +133,8 @@ std::string stop_among_tabs(std::uint64_t seed) {
 
 }  // namespace
 
-std::map<std::string, std::uint64_t> lying_devices(std::uint64_t n, std::uint64_t seed) {
-  std::map<std::string, std::uint64_t> counts;
+Counts lying_devices(std::uint64_t n, std::uint64_t seed) {
+  Counts counts;
   for (std::uint64_t i = 0; i < n; ++i, ++counts["collections"]) {
     DrawnRun drawn(seed + i);
     RigSettings& rig = drawn.rig;

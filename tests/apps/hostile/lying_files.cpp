@@ -1,5 +1,3 @@
-#include "tests/apps/hostile/liars.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,15 +20,11 @@
 #include "io/files/json.h"
 #include "io/files/safetensors.h"
 #include "models/files/model_file.h"
-#include "tests/apps/hostile/evil_value.h"
-#include "tests/apps/hostile/readers.h"
+#include "tests/apps/hostile/hostile.h"
 #include "tests/fuzz/journal_properties.h"
 
 namespace supertac {
 namespace {
-
-using Counts = std::map<std::string, std::uint64_t>;
-using Bytes = std::vector<std::byte>;
 
 constexpr double kEvilNumbers[] = {0,     -1,       1e-30,     1e30,
                                    -1e30, 1e9,      -1e9,      4.2e9,

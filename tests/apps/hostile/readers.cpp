@@ -1,5 +1,3 @@
-#include "tests/apps/hostile/readers.h"
-
 #include <fstream>
 #include <functional>
 #include <iostream>
@@ -21,13 +19,12 @@
 #include "io/numbers/clock.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
+#include "tests/apps/hostile/hostile.h"
 #include "tests/fuzz/journal_properties.h"
 #include "tests/fuzz/stl_properties.h"
 
 namespace supertac {
 namespace {
-
-using Bytes = std::vector<std::byte>;
 
 Bytes bytes_of(const std::string& text) {
   const auto bytes = std::as_bytes(std::span(text));
@@ -101,8 +98,7 @@ Bytes good_pairs(const std::string& folder) {
   return read_file(path, 1 << 20);
 }
 
-void judge_reading(const std::string& what, const std::function<void()>& read,
-                   std::map<std::string, std::uint64_t>& counts) {
+void judge_reading(const std::string& what, const std::function<void()>& read, Counts& counts) {
   const auto found = [&](const char* kind, const std::string& why) {
     ++counts[kind];
     std::cerr << what << ": " << why << '\n';
@@ -220,9 +216,8 @@ Bytes mutant_of(const Bytes& good, const RandomStream& random) {
 
 }  // namespace
 
-std::map<std::string, std::uint64_t> mutants_of_readers(const std::string& folder, std::uint64_t n,
-                                                        std::uint64_t seed) {
-  std::map<std::string, std::uint64_t> counts;
+Counts mutants_of_readers(const std::string& folder, std::uint64_t n, std::uint64_t seed) {
+  Counts counts;
   const std::vector<Reader> all = readers(folder);
   for (std::uint64_t i = 0; i < n; ++i) {
     const Reader& reader = all[i % all.size()];
