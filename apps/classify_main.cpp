@@ -36,7 +36,6 @@ void declare(Arguments& a) {
   a.option("plates", "A,B,...", "the classes (default: the plates the first model was trained on)");
   a.option("seeds", "N", "runs: seeds 0 to N - 1 of classifier and order", "5");
   a.option("epochs", "N", "passes over the training windows", "8");
-  a.option("stride", "N", "train on every N-th window in contact; tested are all", "1");
 }
 
 namespace {
@@ -46,23 +45,31 @@ namespace {
 enum class View { frame, latents, super_resolved };
 inline constexpr const char* kViews[] = {"frame", "latents", "super_resolved"};
 
-// A model, and what it was trained with.
+// A model, what it was trained with, and the two sides of that training's split: neither it nor a classifier
+// that is trained on the first has seen the second.
 struct Candidate {
   std::string path;
   Recipe recipe;
   ModelFile file;
+  std::vector<std::uint32_t> train = {}, test = {};
 };
 
-// What a classifier is trained on and asked: window indices, and a class for each pass of the data.
-struct Dataset {
-  std::vector<std::uint32_t> train, test;
-  std::vector<std::int32_t> label_of_pass;
-};
-
-struct ExperimentSettings {
-  View view = View::frame;
-  std::int64_t epochs = 8;
-  std::uint64_t seed = 0;
+// Windows, and for each pass the class of its plate, by the order in which plates come.
+struct Labelled {
+  explicit Labelled(WindowSet all) : windows(std::move(all)) {
+    std::vector<std::string> plates;
+    for (const WindowSet::Pass& pass : windows.passes()) {
+      const auto known = std::ranges::find(plates, pass.plate);
+      label_of_pass.push_back(static_cast<std::int32_t>(known - plates.begin()));
+      if (known == plates.end()) plates.push_back(pass.plate);
+    }
+    classes = std::ssize(plates);
+    if (classes < 2)
+      throw std::runtime_error("the recordings are of one plate; there is nothing to tell apart");
+  }
+  WindowSet windows;
+  Dim classes = 0;
+  std::vector<std::int32_t> label_of_pass = {};
 };
 
 constexpr std::size_t kBatch = 64;
@@ -96,11 +103,13 @@ Tensor show(View view, const SuperTac& model, const TaxelArray& array, const Ten
   return x;
 }
 
-void train(const TextureClassifier& classifier, const Candidate& model, const WindowSet& windows,
-           const Dataset& data, const ExperimentSettings& s) {
-  const Batching batching(data.train, kBatch, s.seed);
+// Training windows are augmented as the model's were. Throws std::runtime_error when the loss is not finite.
+void train(const TextureClassifier& classifier, const Candidate& model, const Labelled& data, View view,
+           std::int64_t epochs, std::uint64_t seed) {
+  const WindowSet& windows = data.windows;
+  const Batching batching(model.train, kBatch, seed);
   const auto per_epoch = static_cast<std::uint64_t>(batching.batches_per_epoch());
-  const auto total = static_cast<std::int64_t>(per_epoch) * s.epochs;
+  const auto total = static_cast<std::int64_t>(per_epoch) * epochs;
   const Schedule schedule{.peak = kLearningRate,
                           .warm_up = static_cast<std::int64_t>(kWarmUp * static_cast<double>(total)),
                           .total = total};
@@ -114,14 +123,14 @@ void train(const TextureClassifier& classifier, const Candidate& model, const Wi
     Tensor shown = gather(windows, indices);
     const auto size = shown.values().size() / indices.size();
     for (std::size_t n = 0; model.recipe.augment.any() && n < indices.size(); ++n)
-      augment(model.recipe.augment, s.seed, batching.sample(epoch, b, n),
+      augment(model.recipe.augment, seed, batching.sample(epoch, b, n),
               shown.values().subspan(n * size, size), windows.array());
     std::vector<std::int32_t> labels;
     for (const std::uint32_t i : indices) labels.push_back(data.label_of_pass[windows.pass_of(i)]);
-    const Variable x(show(s.view, *model.file.model, windows.array(), shown));
+    const Variable x(show(view, *model.file.model, windows.array(), shown));
     const Variable loss = softmax_cross_entropy(classifier.forward(x), labels);
     if (!std::isfinite(loss.item()))
-      throw std::runtime_error("the classifier of " + std::string(kViews[static_cast<int>(s.view)]) +
+      throw std::runtime_error("the classifier of " + std::string(kViews[static_cast<int>(view)]) +
                                " diverged at step " + std::to_string(step + 1));
     adam.zero_grad();
     backward(loss);
@@ -151,22 +160,9 @@ std::vector<Candidate> load_candidates(const std::vector<std::string>& paths) {
   return all;
 }
 
-// The plates of the windows in the order of their first pass; a plate's place is its class. Throws
-// std::runtime_error when there is only one.
-std::vector<std::string> classes_of(const WindowSet& windows) {
-  std::vector<std::string> names;
-  for (const WindowSet::Pass& pass : windows.passes())
-    if (std::ranges::find(names, pass.plate) == names.end()) names.push_back(pass.plate);
-  if (names.size() < 2)
-    throw std::runtime_error("the recordings are of one plate; there is nothing to tell apart");
-  return names;
-}
-
-// Both sides of the split that the model was trained with, so that neither model nor classifier has seen
-// the tested windows; trained on is every stride-th window in contact. Throws std::runtime_error when that
-// split cannot be repeated on these windows.
-Dataset make_dataset(const WindowSet& windows, const std::string& folder, const Candidate& model,
-                     const std::vector<std::string>& classes, std::int64_t stride) {
+// Repeats the split that the model was trained with, and trains on windows in contact only. Throws
+// std::runtime_error when that split cannot be repeated on these windows.
+void take_split(Candidate& model, const WindowSet& windows, const std::string& folder) {
   std::vector<std::uint32_t> held_out;
   Split split = split_of(windows, model.recipe, held_out);
   // Trials are what they are; other splits are drawn from the windows there are. A training has more windows
@@ -179,42 +175,33 @@ Dataset make_dataset(const WindowSet& windows, const std::string& folder, const 
                                ": its split cannot be repeated on this data, and it may have seen the test "
                                "windows; give the recordings and plates it was trained on");
   }
-  Dataset data;
-  for (const WindowSet::Pass& pass : windows.passes())
-    data.label_of_pass.push_back(
-        static_cast<std::int32_t>(std::ranges::find(classes, pass.plate) - classes.begin()));
-  std::int64_t number = 0;
-  for (const std::uint32_t i : split.train)
-    if (windows.contact(i) && number++ % stride == 0) data.train.push_back(i);
-  if (data.train.empty()) throw std::runtime_error("no training window is in contact with its plate");
-  data.test = std::move(split.test);
-  return data;
+  std::erase_if(split.train, [&](std::uint32_t i) { return !windows.contact(i); });
+  if (split.train.empty()) throw std::runtime_error("no training window is in contact with its plate");
+  model.train = std::move(split.train), model.test = std::move(split.test);
 }
 
-// Trains a classifier and returns its answer to every test window, in order. Training windows are augmented
-// as the model's were. The same arguments give the same answers. Throws std::runtime_error when the loss is
-// not finite, FileError.
-std::vector<std::int32_t> answers(const Candidate& model, const WindowSet& windows, const Dataset& data,
-                                  const std::vector<std::string>& classes,
-                                  const ExperimentSettings& settings) {
+// Trains a classifier and returns its answer to every test window, in order. The same arguments give the same
+// answers.
+std::vector<std::int32_t> answers(const Candidate& model, const Labelled& data, View view,
+                                  std::int64_t epochs, std::uint64_t seed) {
   const auto shown = [&](std::span<const std::uint32_t> indices) {
-    return show(settings.view, *model.file.model, windows.array(), gather(windows, indices));
+    return show(view, *model.file.model, data.windows.array(), gather(data.windows, indices));
   };
-  const Tensor sample = shown(std::span(data.train).first(1));
-  const auto count = static_cast<Dim>(classes.size());
-  Rng rng(settings.seed);
+  const Tensor sample = shown(std::span(model.train).first(1));
+  Rng rng(seed);
   const TextureClassifier classifier(
-      {.height = sample.dim(1), .width = sample.dim(2), .channels = sample.dim(3), .classes = count}, rng);
-  train(classifier, model, windows, data, settings);
+      {.height = sample.dim(1), .width = sample.dim(2), .channels = sample.dim(3), .classes = data.classes},
+      rng);
+  train(classifier, model, data, view, epochs, seed);
   const NoGrad no_grad;
-  const std::span<const std::uint32_t> test(data.test);
+  const std::span<const std::uint32_t> test(model.test);
   std::vector<std::int32_t> result;
   for (std::size_t first = 0; first < test.size(); first += kBatch) {
     stop_if_interrupted();
     const Variable x(shown(test.subspan(first, std::min(kBatch, test.size() - first))));
     const Tensor logits = classifier.forward(x).value();
-    for (const real* row = logits.data(); row != logits.data() + logits.values().size(); row += count)
-      result.push_back(static_cast<std::int32_t>(std::max_element(row, row + count) - row));
+    for (const real* row = logits.data(); row != logits.data() + logits.values().size(); row += data.classes)
+      result.push_back(static_cast<std::int32_t>(std::max_element(row, row + data.classes) - row));
   }
   return result;
 }
@@ -286,29 +273,29 @@ using Parts = std::vector<Tally>;  // by kParts
 
 // Every view in every run, spread over the threads.
 std::vector<Parts> experiment(const Arguments& a, const std::vector<View>& views,
-                              const std::vector<Candidate>& models, const WindowSet& windows,
-                              const std::vector<Dataset>& data, const std::vector<std::string>& classes) {
+                              const std::vector<Candidate>& models, const Labelled& data) {
   const auto epochs = a.integer("epochs", 1, 10'000);
   std::vector<std::vector<std::int32_t>> given(views.size() *
                                                static_cast<std::size_t>(a.integer("seeds", 1, 1000)));
   std::size_t done = 0;
   Progress progress(a, "classifying", given.size(), "classifiers");
+  const auto model_of = [&](std::size_t job) -> const Candidate& {
+    return models[job / views.size() % models.size()];
+  };
   parallel_for(given.size(), [&](std::size_t job) {
-    ExperimentSettings s{.view = views[job % views.size()], .epochs = epochs, .seed = job / views.size()};
-    const std::size_t m = s.seed % models.size();
-    given[job] = answers(models[m], windows, data[m], classes, s);
+    given[job] = answers(model_of(job), data, views[job % views.size()], epochs, job / views.size());
 #pragma omp critical
     progress.update(++done);
   });
   std::vector<Parts> results(views.size(), Parts(std::size(kParts)));
   for (std::size_t job = 0; job < given.size(); ++job) {
-    const Dataset& asked = data[job / views.size() % data.size()];
-    const std::vector<std::size_t> parts = parts_of(windows, asked.test);
+    const std::vector<std::uint32_t>& test = model_of(job).test;
+    const std::vector<std::size_t> parts = parts_of(data.windows, test);
     Parts& tallies = results[job % views.size()];
-    for (std::size_t n = 0; n < asked.test.size(); ++n) {
-      const std::size_t pass = windows.pass_of(asked.test[n]);
+    for (std::size_t n = 0; n < test.size(); ++n) {
+      const std::size_t pass = data.windows.pass_of(test[n]);
       for (std::size_t p = parts[n]; p < tallies.size(); ++p)
-        tallies[p].add(pass, asked.label_of_pass[pass], given[job][n]);
+        tallies[p].add(pass, data.label_of_pass[pass], given[job][n]);
     }
     for (Tally& tally : tallies) tally.end_run();
   }
@@ -343,31 +330,27 @@ nlohmann::ordered_json report(const Arguments& a, const std::vector<View>& views
 }  // namespace
 
 int run(Arguments& a) {
-  const std::int64_t stride = a.integer("stride", 1, 100'000);
-  const std::vector<Candidate> models = load_candidates(a.list("model"));
+  std::vector<Candidate> models = load_candidates(a.list("model"));
   add_model_parents(a.list("model"));
   const Candidate& first = models.front();
   std::vector<View> views{View::frame, View::latents, View::super_resolved};
   if (first.file.model->settings().timesteps == 1) views = {View::frame, View::super_resolved};
   WindowSettings taken = first.file.windows();
   taken.stride = static_cast<int>(first.recipe.stride);
-  const WindowSet windows =
-      WindowSet::load(a.text("data"), a.given("plates") ? a.list("plates") : first.recipe.plates, taken);
-  const std::vector<std::string> classes = classes_of(windows);
-  std::vector<Dataset> data;
-  for (const Candidate& model : models)
-    data.push_back(make_dataset(windows, a.text("data"), model, classes, stride));
+  const Labelled data(
+      WindowSet::load(a.text("data"), a.given("plates") ? a.list("plates") : first.recipe.plates, taken));
+  for (Candidate& model : models) take_split(model, data.windows, a.text("data"));
   const std::string split = name_of(first.recipe.split);
-  a.note("split " + split + ": " + std::to_string(data.front().train.size()) + " training windows, " +
-         std::to_string(data.front().test.size()) + " test windows");
-  const std::vector<Parts> results = experiment(a, views, models, windows, data, classes);
+  a.note("split " + split + ": " + std::to_string(first.train.size()) + " training windows, " +
+         std::to_string(first.test.size()) + " test windows");
+  const std::vector<Parts> results = experiment(a, views, models, data);
   a.print(std::string("frame: the last frame of the window as the network sees it, ") +
           (taken.scaling.per_window ? "normalised to the window's own rest and gain"
                                     : "scaled by the model's fixed range") +
           ", not the raw signals");
   a.write_json({{"command", a.command_line()},
                 {"commit", commit()},
-                {"data", windows.fingerprint()},
+                {"data", data.windows.fingerprint()},
                 {"split", split},
                 {"runs", a.integer("seeds", 1, 1000)},
                 {"views", report(a, views, results)}});

@@ -4,17 +4,17 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <optional>
 
 #include "apps/collect/collect_view.h"
-#include "apps/collect/origin_mark.h"
 #include "apps/collect/passes.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
-#include "apps/web/web_options.h"
+#include "apps/web/web_server.h"
 #include "data/plates/plate.h"
 #include "data/recordings/recording.h"
 #include "hardware/collection/palpation_recorder.h"
@@ -22,7 +22,6 @@
 #include "hardware/ports/open_port.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
-#include "io/files/folder_lock.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
@@ -55,6 +54,57 @@ void declare(Arguments& arguments) {
 namespace {
 
 constexpr int kMostPasses = 1000;
+
+namespace fs = std::filesystem;
+
+// The place of the XDG base directory specification, which has a relative path ignored.
+fs::path state_folder() {
+  const char* state = getenv("XDG_STATE_HOME");
+  if (state != nullptr && fs::path(state).is_absolute()) return state;
+  const char* home = getenv("HOME");
+  if (home != nullptr && fs::path(home).is_absolute()) return fs::path(home) / ".local/state";
+  throw FileError(
+      "XDG_STATE_HOME",
+      "expected a folder that remembers where the printer was left, found neither it nor HOME; set one");
+}
+
+/// Says that nobody knows where a printer's head is: set while a run moves it, and left by one that did not
+/// end with the head back at its origin, were it by kill -9 or a power cut. It belongs to the printer, not to
+/// a folder of recordings: a file $XDG_STATE_HOME/supertac/origin-unknown/PORT (~/.local/state/...).
+class OriginMark {
+ public:
+  /// Throws FileError when there is no place for it.
+  explicit OriginMark(const std::string& printer_port)
+      : file_((state_folder() / "supertac/origin-unknown").string() + lasting_port_name(printer_port)) {}
+  bool is_set() const {
+    std::error_code error;
+    const bool found = fs::exists(file_, error);
+    return found || error;  // what cannot be looked at may be there
+  }
+  /// `why`: how the run ended. On the disk when it returns. Throws FileError
+  void set(const std::string& why = "was cut off") const {
+    make_directories(fs::path(file_).parent_path().string());
+    write_file(file_, "the head's position is unknown until a run on this printer has ended at its origin\n" +
+                          printable(why, 300));
+  }
+  /// That of the run that left it; a mark of before it said why holds its first line alone.
+  std::string why() const {
+    constexpr std::size_t kMost = 4096;
+    const std::string text = read_text_file(file_, kMost);
+    const std::size_t line = text.find('\n');
+    const std::string found = line == std::string::npos ? "" : text.substr(line + 1);
+    return found.empty() ? "was cut off" : printable(found, kMost);
+  }
+  /// Throws FileError
+  void clear() const {
+    std::error_code error;
+    fs::remove(file_, error);
+    if (error) throw FileError(file_, "cannot be removed: " + error.message() + "; remove it by hand");
+  }
+
+ private:
+  std::string file_;
+};
 
 /// A line from the terminal. std::getline goes on waiting after a signal.
 std::string ask_operator() {
@@ -184,7 +234,7 @@ void refuse_taken(const Arguments& arguments, const std::string& out, Recording 
       names.push_back(out + "/" + recording_file_name(named));
     const auto found = std::ranges::find_if(names, [](const std::string& name) {
       std::error_code error;
-      return std::filesystem::exists(std::filesystem::symlink_status(name, error));
+      return fs::exists(fs::symlink_status(name, error));
     });
     return found == names.end() ? "" : *found;
   };
@@ -239,7 +289,7 @@ PassesReport keep_passes(const Arguments& arguments, const std::string& journal,
   if (report.frames + report.left_out > 0) {
     folder.keep(kDespiteSignals);
   } else {  // this run's own, which would be in the way of the next and could not be imported
-    std::filesystem::remove(journal);
+    fs::remove(journal);
     report.json["journal"] = nullptr;
   }
   arguments.write_json(report.json);
@@ -252,7 +302,7 @@ PassesReport keep_passes(const Arguments& arguments, const std::string& journal,
   const std::string why = outcome.error ? text_of(outcome.error) + "; " : "";
   std::error_code gone;
   throw std::runtime_error(why + error.what() + "; the journal " + journal +
-                           (std::filesystem::exists(journal, gone)
+                           (fs::exists(journal, gone)
                                 ? " is kept, make recordings of it with supertac-import --journal"
                                 : " is gone: somebody removed it during the run"));
 }

@@ -7,7 +7,6 @@
 #include "apps/common/running/progress.h"
 #include "apps/evaluate/exports.h"
 #include "apps/evaluate/map_scores.h"
-#include "apps/evaluate/page.h"
 #include "apps/evaluate/score_tables.h"
 #include "apps/evaluate/scoring.h"
 #include "data/recordings/recording.h"
@@ -48,9 +47,7 @@ WindowSet load_windows(const Arguments& a, const ModelFile& file) {
       a.given("plates") ? a.list("plates") : comma_list(value_or(file.metadata, "plates"));
   add_model_parents(a.list("model"));
   add_parent("recordings", hash_of_recordings(a.text("data"), plates));
-  WindowSettings settings = file.windows();
-  if (a.given("contact")) settings.contact_level = static_cast<float>(a.number("contact", 0, 1));
-  return WindowSet::load(a.text("data"), plates, settings,
+  return WindowSet::load(a.text("data"), plates, file.windows(),
                          progress_of(a, "reading " + a.text("data"), "recordings"));
 }
 
@@ -68,24 +65,19 @@ std::string row(const std::string& name, const ZoneMetrics& metrics, const Laten
 struct RecordingScores {
   RecordingScores(const WindowSet& windows, const ModelFile& model, const std::vector<Plate>& kinds,
                   std::size_t methods)
-      : by_distance(windows),
-        by_group(windows),
-        trust(windows, model),
-        map(windows, model, kinds),
-        by_pass(windows) {
+      : by_group(windows), trust(windows, model), map(windows, model, kinds) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
   std::vector<ZoneMetrics> of_method;
-  DistanceScores by_distance;
+  std::vector<ContactScore> contact;
   GroupScores by_group;
   TrustScores trust;
   MapScores map;
-  PassScores by_pass;
 };
 
 RecordingScores score_all(const Arguments& a, const Ensemble& network, const ModelFile& file,
                           const WindowSet& windows, const TestSet& tested, const Baselines& baselines,
-                          const std::vector<Plate>& kinds, OutputsFile* outputs, EvaluationPage* page) {
+                          const std::vector<Plate>& kinds, OutputsFile* outputs) {
   RecordingScores scores(windows, file, kinds, 1 + baselines.size());
   draw_all(a, network, windows, tested.split.test, baselines, [&](const Drawn& d) {
     const Zone zone = windows.zone(d.example);
@@ -95,11 +87,7 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
     scores.map.add(d);
     const auto one = contact_score(windows, d.example, d.pictures[0], d.target);
     scores.trust.add(d, one);
-    if (one) {
-      scores.by_distance.add(*one);
-      scores.by_pass.add(*one);
-      if (page != nullptr) page->add(d, one->ssim);
-    }
+    if (one) scores.contact.push_back(*one);
     if (outputs != nullptr)
       outputs->add(d.input, d.pictures[0], d.target, d.predicted_error, windows.position(d.example),
                    windows.pass_of(d.example));
@@ -133,7 +121,7 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
                               const RecordingScores& scores) {
   const ZoneMetrics& own = scores.of_method.front();
   nlohmann::ordered_json result = own.to_json();
-  result["felt"] = scores.by_distance.to_json();
+  result["felt"] = scores_by_distance(windows, scores.contact);
   result["groups"] = scores.by_group.to_json();
   result["trust"] = scores.trust.to_json();
   if (!scores.map.empty()) result["map"] = scores.map.to_json();
@@ -154,16 +142,15 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
     latencies[name] = l.to_json();
     result["baselines"][name] = scores.of_method[k + 1].to_json();
   }
-  if (const std::string interval = scores.by_pass.interval_text(); !interval.empty())
+  if (const std::string interval = interval_text(windows, scores.contact); !interval.empty())
     a.print("95 % intervals of the network's contact windows over passes: " + interval);
-  result["over_passes"] = scores.by_pass.to_json();
+  result["over_passes"] = scores_by_pass(windows, scores.contact);
   for (const std::string& line : silence_lines(own, windows.contact_level().has_value())) a.print(line);
   for (const std::string& line : scores.by_group.lines()) a.print(line);
   for (const std::string& line : scores.trust.lines()) a.print(line);
   for (const std::string& line : scores.map.lines()) a.print(line);
   if (const auto level = windows.contact_level()) {
-    a.print("contact: a pixel of the measured truth above " + format(*level, 3) +
-            (a.given("contact") ? "" : ", from its noise at rest"));
+    a.print("contact: a pixel of the measured truth above " + format(*level, 3) + ", from its noise at rest");
     result["contact_level"] = *level;
   }
   result["latency"] = latencies;
@@ -198,10 +185,6 @@ void declare(Arguments& a) {
   a.option("limit", "N", "score at most N windows, evenly spread; 0 = all", "0");
   a.option("history", "N", "score only windows with N frames of their pass behind them", "0");
   a.option("precision", "NAME", "fp32, or int8: the pictures of a microcontroller, slower", "fp32");
-  a.option("contact", "VALUE",
-           "of a measured truth: where a pixel shows more, from 0 to 1, something is in contact (default: "
-           "from its noise "
-           "at rest)");
   a.option("outputs", "FILE",
            "write inputs as the network takes them, outputs, truths and predicted errors as safetensors")
       .writes();
@@ -247,10 +230,8 @@ int run(Arguments& a) {
   OutputsFile outputs(windows.array(), windows.frames(), windows.image());
   const Baselines baselines =
       fit_baselines(windows, tested.split.train, progress_of(a, "fitting the baselines", "parts"));
-  EvaluationPage page(windows);
-  const RecordingScores scores =
-      score_all(a, network, files.front(), windows, tested, baselines, kinds,
-                a.given("outputs") ? &outputs : nullptr, a.given("report") ? &page : nullptr);
+  const RecordingScores scores = score_all(a, network, files.front(), windows, tested, baselines, kinds,
+                                           a.given("outputs") ? &outputs : nullptr);
   const nlohmann::ordered_json result = report(a, network, windows, tested, baselines, scores);
   if (pictures) write_pictures(network, files.front().interval(), windows, tested.split.test, *pictures);
   if (a.given("outputs")) outputs.write(a.output("outputs"));
@@ -259,7 +240,9 @@ int run(Arguments& a) {
     if (!kinds.empty()) std::ranges::for_each(maps, [&](NamedMap& map) { draw_as(map, kinds); });
     write_maps(a.output("map"), maps);
   }
-  if (a.given("report")) write_file(a.output("report"), page.html(network, result, made_by(a, windows)));
+  if (a.given("report"))
+    write_file(a.output("report"),
+               evaluation_page(network, windows, scores.contact, result, made_by(a, windows)));
   if (pictures) pictures->keep();
   a.write_json(result);
   return kExitOk;

@@ -10,7 +10,6 @@
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
-#include "io/files/provenance.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"

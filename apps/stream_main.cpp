@@ -7,7 +7,7 @@
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "apps/stream/stream.h"
-#include "apps/web/web_options.h"
+#include "apps/web/web_server.h"
 #include "data/plates/plate.h"
 #include "hardware/boards/sensor_reader.h"
 #include "hardware/ports/serial_port.h"

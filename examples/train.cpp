@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <exception>
 
-#include <supertac/io/files/provenance.h>
+#include <supertac/io/files/safetensors.h>
 #include <supertac/models/training/train.h>
 
 using namespace supertac;

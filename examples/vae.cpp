@@ -85,13 +85,11 @@ Tensor normal(const RandomStream& random, std::uint64_t first, Dim n) {
 // One column for each picture: it, its reconstruction, and one that was dreamt up.
 void draw(const char* path, const Tensor& shown, const Tensor& decoded, const Tensor& dreamt) {
   constexpr std::size_t kPixels = kSide * kSide;
-  std::vector<Strip> columns;
-  for (std::size_t at = 0; at < shown.values().size(); at += kPixels)
-    columns.push_back({shown.values().subspan(at, kPixels),
-                       decoded.values().subspan(at, kPixels),
-                       dreamt.values().subspan(at, kPixels),
-                       {}});
-  write_png(path, film_picture(columns, {.rows = kSide, .columns = kSide, .scale = 1, .side = 64}));
+  std::vector<PanelValues> panels;
+  for (const Tensor* row : {&shown, &decoded, &dreamt})
+    for (std::size_t at = 0; at < row->values().size(); at += kPixels)
+      panels.push_back({row->values().subspan(at, kPixels), kSide, kSide});
+  write_png(path, panel_grid(panels, static_cast<int>(shown.dim(0)), 64));
 }
 
 void train_and_draw(const char* path) {

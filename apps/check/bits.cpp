@@ -4,7 +4,7 @@
 #include "apps/common/command_line/program.h"
 #include "autograd/kernels/fast/isa/isa.h"
 #include "data/simulation/simulator.h"
-#include "io/numbers/sha256.h"
+#include "io/numbers/hash.h"
 #include "models/inference/compiled/compiled_model.h"
 #include "models/training/trainer.h"
 

@@ -13,7 +13,7 @@
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
-#include "io/files/provenance.h"
+#include "io/files/safetensors.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"

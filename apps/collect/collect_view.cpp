@@ -3,7 +3,6 @@
 #include <signal.h>
 
 #include "apps/common/running/signals.h"
-#include "apps/web/encode.h"
 #include "apps/web/pages.h"
 #include "data/plates/truth.h"
 #include "data/sensors/rig.h"
@@ -36,8 +35,7 @@ WebSite CollectView::site() {
   return {.page = collect_page(),
           .hello = [this] { return hello(); },
           .news = [this] { return news(); },
-          .actions = {{"stop", stop_as_ctrl_c}},
-          .file = {}};
+          .actions = {{"stop", stop_as_ctrl_c}}};
 }
 
 void CollectView::update(const Leg& leg, const Point3& at, const ReaderCounters& board) {

@@ -1,3 +1,4 @@
+// From the journal of a collection to a recording for each pass.
 #pragma once
 
 #include <string>

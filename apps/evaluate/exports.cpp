@@ -1,13 +1,16 @@
 #include "apps/evaluate/exports.h"
 
+#include <algorithm>
+#include <cmath>
 #include <map>
+#include <utility>
 
-#include "apps/evaluate/scoring.h"
+#include "apps/web/pages.h"
 #include "data/windows/split.h"
 #include "io/files/safetensors.h"
-#include "io/images/captions.h"
 #include "io/images/images.h"
 #include "io/numbers/numbers.h"
+#include "models/inference/evaluation.h"
 
 namespace supertac {
 namespace {
@@ -16,17 +19,53 @@ constexpr std::size_t kStrips = 12, kFilmColumns = 24;
 
 constexpr const char* kParts[] = {"felt", "drawn", "true", "off by"};
 
-// With headings, units and a colour bar. `down`: windows stand below each other, else side by side.
+// A window as it is shown to people.
+struct ShownWindow {
+  std::vector<float> input, drawn, truth;  // the last frame's taxels, and pictures
+  std::vector<float> half_widths;          // of the pixels' 90 % intervals; empty where the network has none
+};
+
+// The windows `chosen`, drawn once more.
+std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& windows,
+                                    std::span<const std::uint32_t> chosen, const PixelInterval& interval) {
+  std::vector<ShownWindow> shown;
+  for_each_output(network, windows, chosen, [&](const EvaluatedBatch& b) {
+    for (std::size_t n = 0; n < b.size(); ++n) {
+      const auto drawn = b.output(n), truth = b.target(n);
+      ShownWindow one{.input = mean_of_channels(windows.array(), windows.shown_frame(chosen[b.first + n])),
+                      .drawn = {drawn.begin(), drawn.end()},
+                      .truth = {truth.begin(), truth.end()},
+                      .half_widths = {}};
+      interval.with_load(network.first().format(), b.input(n), b.predicted_error(n), one.half_widths);
+      interval.half_widths(drawn, windows.image().width, one.half_widths, one.half_widths);
+      shown.push_back(std::move(one));
+    }
+    return true;
+  });
+  return shown;
+}
+
+// Each window's parts, with headings, units and a colour bar. `down`: windows stand below each other, else
+// side by side.
 Picture figure(const std::vector<ShownWindow>& shown, std::span<const std::uint32_t> chosen,
                const WindowSet& windows, int side, bool down, const std::string& title) {
-  const TaxelArray array = windows.array();
-  const StripLayout layout{array.rows, array.columns, windows.settings().scale, side};
-  std::vector<Strip> strips;
-  for (const ShownWindow& w : shown) strips.push_back({w.input, w.drawn, w.truth, w.half_widths});
-  const Picture inside = down ? strip_picture(strips, layout) : film_picture(strips, layout);
-  const int parts = shown.empty() || shown.front().half_widths.empty() ? 3 : 4,
-            count = static_cast<int>(strips.size());
+  const TaxelArray& array = windows.array();
   const ImageGrid image = windows.image();
+  const int parts = shown.empty() || shown.front().half_widths.empty() ? 3 : 4,
+            count = static_cast<int>(shown.size());
+  std::vector<PanelValues> panels;
+  for (int i = 0; i < count * parts; ++i) {
+    const ShownWindow& w = shown[static_cast<std::size_t>(down ? i / parts : i % count)];
+    const int part = down ? i % parts : i / count;
+    if (part == 0)
+      panels.push_back({w.input, array.rows, array.columns});
+    else
+      panels.push_back({part == 1   ? w.drawn
+                        : part == 2 ? w.truth
+                                    : w.half_widths,
+                        image.height, image.width});
+  }
+  const Picture inside = panel_grid(panels, down ? parts : count, side);
   Captions captions{.title = title + "; a picture is " + format(image.width_mm()) + " x " +
                              format(image.height_mm()) + " mm",
                     .low = "0: nothing, not pressed",
@@ -47,6 +86,59 @@ Picture figure(const std::vector<ShownWindow>& shown, std::span<const std::uint3
       captions.columns.push_back({middle(inside.width, count, i), place});
   }
   return captioned(inside, captions);
+}
+
+constexpr std::size_t kShown = 12, kGroups = 8, kOfGroup = 3;  // windows, groups, and windows of a group
+
+// The best or worst that do not lie beside each other; of all groups, or of one.
+std::vector<ContactScore> extremes(const WindowSet& windows, std::span<const ContactScore> scores, bool best,
+                                   const std::string& group = {}, std::size_t most = kShown) {
+  constexpr double kApartMm = 3;
+  constexpr std::uint32_t kApartFrames = 20;
+  std::vector<ContactScore> sorted, chosen;
+  for (const ContactScore& one : scores)
+    if (group.empty() || group_of(windows.passes()[windows.pass_of(one.window)]) == group)
+      sorted.push_back(one);
+  std::ranges::sort(sorted, {}, [best](const ContactScore& one) {
+    return std::pair(best ? -one.ssim : one.ssim, one.window);
+  });
+  const auto near = [&](const ContactScore& a, const ContactScore& b) {
+    return windows.pass_of(a.window) == windows.pass_of(b.window) &&
+           (windows.truth_is_measured(windows.pass_of(a.window))
+                ? std::max(a.window, b.window) - std::min(a.window, b.window) < kApartFrames
+                : std::abs(windows.position(a.window).y_mm - windows.position(b.window).y_mm) < kApartMm);
+  };
+  for (const ContactScore& one : sorted) {
+    if (chosen.size() == most) break;
+    if (best && !one.is_full) continue;  // the edge of a texture is drawn well too easily
+    if (std::ranges::none_of(chosen, [&](const ContactScore& c) { return near(c, one); }))
+      chosen.push_back(one);
+  }
+  return chosen;
+}
+
+std::string name_of(const WindowSet& windows, std::uint32_t window) {
+  const WindowSet::Pass& pass = windows.passes()[windows.pass_of(window)];
+  return (group_of(pass) == pass.plate ? "" : pass.group + ", ") + pass.plate + ", trial " +
+         std::to_string(pass.trial) + ", pass " + std::to_string(pass.pass) +
+         (pass.speed_mm_s > 0 ? ", " + format(pass.speed_mm_s) + " mm/s" : "") + ", " +
+         windows.place_text(window);
+}
+
+nlohmann::ordered_json shown(const std::vector<ContactScore>& chosen, const WindowSet& windows,
+                             const Ensemble& network) {
+  std::vector<std::uint32_t> which;
+  for (const ContactScore& one : chosen) which.push_back(one.window);
+  const std::vector<ShownWindow> pictures = draw_again(network, windows, which, {});
+  auto json = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < chosen.size(); ++i)
+    json.push_back({{"name", name_of(windows, which[i])},
+                    {"ssim", chosen[i].ssim},
+                    {"psnr_db", chosen[i].psnr_db},
+                    {"felt", levels_base64(pictures[i].input)},
+                    {"drawn", levels_base64(pictures[i].drawn)},
+                    {"true", levels_base64(pictures[i].truth)}});
+  return json;
 }
 
 }  // namespace
@@ -105,6 +197,28 @@ void write_pictures(const Ensemble& model, const PixelInterval& interval, const 
                     p.plate + ", trial " + std::to_string(p.trial) + ", pass " + std::to_string(p.pass) +
                         ", " + format(p.speed_mm_s) + " mm/s"));
   }
+}
+
+std::string evaluation_page(const Ensemble& network, const WindowSet& windows,
+                            std::span<const ContactScore> scores, const nlohmann::ordered_json& result,
+                            const std::vector<std::pair<std::string, std::string>>& made_by) {
+  std::vector<ContactScore> of_groups;
+  const std::size_t groups = result["groups"].size();
+  for (std::size_t i = 0; i < std::min(groups, kGroups) && groups > 1; ++i)
+    std::ranges::copy(
+        extremes(windows, scores, false, result["groups"][i]["name"].get<std::string>(), kOfGroup),
+        std::back_inserter(of_groups));
+  return result_page({{"title", "SuperTac evaluation"},
+                      {"result", result},
+                      {"made_by", made_by},
+                      {"grouped", has_groups(windows)},
+                      {"rows", windows.array().rows},
+                      {"columns", windows.array().columns},
+                      {"scale", windows.settings().scale},
+                      {"map", colour_map_base64()},
+                      {"worst_of_groups", shown(of_groups, windows, network)},
+                      {"worst", shown(extremes(windows, scores, false), windows, network)},
+                      {"best", shown(extremes(windows, scores, true), windows, network)}});
 }
 
 }  // namespace supertac

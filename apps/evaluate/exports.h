@@ -1,11 +1,15 @@
-// What an evaluation shows besides its table: pictures, and the arrays behind them.
+// What an evaluation shows besides its tables: pictures, the arrays behind them, and a page.
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/common/output/output_folder.h"
+#include "apps/evaluate/score_tables.h"
 #include "data/windows/windows.h"
 #include "models/inference/compiled/compiled_model.h"
 #include "models/inference/interval.h"
@@ -36,5 +40,14 @@ class OutputsFile {
 /// film_<plate>_t<trial>_p<pass>.png. Throws FileError.
 void write_pictures(const Ensemble& model, const PixelInterval& interval, const WindowSet& windows,
                     std::span<const std::uint32_t> test, OutputFolder& folder);
+
+/// The page of an evaluation: scores beside those of the baselines, by group or plate (the worst first), zone
+/// and distance since the first contact; the three worst windows in contact of each of the eight worst
+/// groups; the twelve worst windows in contact, and the twelve best of those with texture on a quarter of the
+/// picture, no two of them within 3 mm of one pass; and what made it all. `result` is the evaluation's JSON;
+/// `made_by` says what to repeat it with, a name and a text each. The windows shown are drawn once more.
+std::string evaluation_page(const Ensemble& network, const WindowSet& windows,
+                            std::span<const ContactScore> scores, const nlohmann::ordered_json& result,
+                            const std::vector<std::pair<std::string, std::string>>& made_by);
 
 }  // namespace supertac

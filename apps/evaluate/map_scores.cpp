@@ -49,8 +49,7 @@ void MapScores::finish() {
     const auto score = [&](const SurfaceMap& map, Scored& scored) {
       stated_ ? truth_image(drawn.at(&map), x, y, windows_.image(), read) : map.read(x, y, read);
       scored.zones.add(read, truth, windows_.zone(window));
-      if (const auto one = contact_score(windows_, window, read, truth))
-        scored.by_distance.add(*one), scored.by_pass.add(*one);
+      if (const auto one = contact_score(windows_, window, read, truth)) scored.contact.push_back(*one);
     };
     score(of_pass_.at(pass), by_pass_);
     score(of_surface_.at(surface_of(pass)).first, by_surface_);
@@ -61,9 +60,9 @@ void MapScores::finish() {
 
 std::vector<std::string> MapScores::lines() const {
   if (empty()) return {};
-  const auto text = [](const Scored& scored) {
+  const auto text = [this](const Scored& scored) {
     const Metrics contact = scored.zones.contact();
-    const std::string interval = scored.by_pass.interval_text();
+    const std::string interval = interval_text(windows_, scored.contact);
     return "SSIM " + format(contact.ssim, 3) + ", PSNR " + format(contact.psnr_mean_db, 2) + " dB" +
            (interval.empty() ? "" : " (95 % over passes: " + interval + ")");
   };
@@ -91,8 +90,8 @@ nlohmann::ordered_json MapScores::to_json() const {
     const Metrics contact = scored->zones.contact();
     json[name] = {{"ssim", number(contact.ssim)},
                   {"psnr_mean_db", number(contact.psnr_mean_db)},
-                  {"felt", scored->by_distance.to_json()},
-                  {"over_passes", scored->by_pass.to_json()},
+                  {"felt", scores_by_distance(windows_, scored->contact)},
+                  {"over_passes", scores_by_pass(windows_, scored->contact)},
                   {"elements",
                    {{"existing", scored->elements.existing},
                     {"found", scored->elements.found},

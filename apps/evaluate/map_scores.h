@@ -33,8 +33,8 @@ class MapScores {
   bool empty() const { return added_.empty(); }
   /// For people: nothing when empty().
   std::vector<std::string> lines() const;
-  /// {"of_pass": {"ssim", "psnr_mean_db", "felt": as DistanceScores, "over_passes": as
-  /// PassScores, "elements": {"existing", "found", "false", "median_mm", "pitch_error_mm"}},
+  /// {"of_pass": {"ssim", "psnr_mean_db", "felt": scores_by_distance(), "over_passes":
+  /// scores_by_pass(), "elements": {"existing", "found", "false", "median_mm", "pitch_error_mm"}},
   /// "of_surface": the same, "surfaces": {PLATE_tTRIAL: {"kind", "kind_share", "pitch_mm", "elements":
   /// [{"x_mm", "y_mm", ...}]}}, "passes": {PLATE_tTRIAL_pPASS: the same without "elements"}}
   nlohmann::ordered_json to_json() const;
@@ -43,11 +43,9 @@ class MapScores {
 
  private:
   struct Scored {
-    explicit Scored(const WindowSet& windows)
-        : zones(windows.image()), by_distance(windows), by_pass(windows) {}
+    explicit Scored(const WindowSet& windows) : zones(windows.image()) {}
     ZoneMetrics zones;
-    DistanceScores by_distance;
-    PassScores by_pass;
+    std::vector<ContactScore> contact = {};
     ElementScores elements = {};
   };
   std::string surface_of(std::size_t pass) const;

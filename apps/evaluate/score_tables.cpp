@@ -1,7 +1,9 @@
 #include "apps/evaluate/score_tables.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "io/numbers/numbers.h"
@@ -9,44 +11,33 @@
 
 namespace supertac {
 
-std::optional<ContactScore> contact_score(const WindowSet& windows, std::uint32_t window,
-                                          std::span<const float> picture, std::span<const float> truth) {
-  if (!windows.contact(window)) return std::nullopt;
-  const ImageGrid grid = windows.image();
-  return ContactScore{window, ssim(picture, truth, grid.height, grid.width),
-                      psnr_db(mean_squared_error(picture, truth))};
-}
+namespace {
 
-void DistanceScores::add(const ContactScore& one) {
-  const WindowSet::Position here = windows_.position(one.window);
-  if (windows_.pass_of(one.window) != pass_) {
-    pass_ = windows_.pass_of(one.window);
-    begin_ = here;
+/// Over some windows in contact.
+struct ScoreSums {
+  double ssim = 0, psnr = 0;
+  std::uint64_t windows = 0;
+  void add(const ContactScore& one) { ssim += one.ssim, psnr += one.psnr_db, ++windows; }
+  nlohmann::ordered_json to_json() const {
+    const auto count = static_cast<double>(windows);
+    return {{"windows", windows}, {"ssim", ssim / count}, {"psnr_mean_db", psnr / count}};
   }
-  const double slid = std::hypot(here.x_mm - begin_.x_mm, here.y_mm - begin_.y_mm);
-  if (!std::isfinite(slid)) return;  // nobody knows where it was
-  std::size_t p = parts_.size() - 1;
-  while (p > 0 && slid < parts_[p].from_mm) --p;
-  parts_[p].sums.add(one);
+};
+using PassSums = std::map<std::size_t, ScoreSums>;
+
+PassSums sums_of(const WindowSet& windows, std::span<const ContactScore> scores) {
+  PassSums passes;
+  for (const ContactScore& one : scores) passes[windows.pass_of(one.window)].add(one);
+  return passes;
 }
 
-nlohmann::ordered_json DistanceScores::to_json() const {
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  for (const auto& [from_mm, sums] : parts_)
-    if (sums.windows > 0)
-      json.push_back({{"from_mm", from_mm},
-                      {"windows", sums.windows},
-                      {"ssim", sums.mean_ssim()},
-                      {"psnr_mean_db", sums.mean_psnr()}});
-  return json;
-}
-
-std::array<Interval, 2> PassScores::intervals() const {
+/// Of SSIM and PSNR.
+std::array<Interval, 2> intervals_of(const WindowSet& windows, const PassSums& passes) {
   std::vector<ClusterCount> ssims, psnrs;
   std::vector<std::size_t> plates;
   std::vector<std::string> names;
-  for (const auto& [pass, sums] : passes_) {
-    const std::string& plate = windows_.passes()[pass].plate;
+  for (const auto& [pass, sums] : passes) {
+    const std::string& plate = windows.passes()[pass].plate;
     auto at = std::ranges::find(names, plate);
     if (at == names.end()) at = names.insert(names.end(), plate);
     plates.push_back(static_cast<std::size_t>(at - names.begin()));
@@ -54,34 +45,67 @@ std::array<Interval, 2> PassScores::intervals() const {
     ssims.push_back({sums.ssim, count}), psnrs.push_back({sums.psnr, count});
   }
   // Groups of a pass each are drawn themselves: one pass drawn anew within its plate is always the same.
-  if (names.size() == passes_.size()) std::ranges::fill(plates, 0);
+  if (names.size() == passes.size()) std::ranges::fill(plates, 0);
   return {bootstrap_interval(ssims, plates), bootstrap_interval(psnrs, plates)};
 }
 
-std::string PassScores::interval_text() const {
-  if (passes_.size() < 2) return "";
-  const auto [ssim, psnr] = intervals();
-  return "SSIM " + format(ssim.low, 3) + " to " + format(ssim.high, 3) + ", PSNR " + format(psnr.low, 2) +
-         " to " + format(psnr.high, 2) + " dB";
+}  // namespace
+
+std::optional<ContactScore> contact_score(const WindowSet& windows, std::uint32_t window,
+                                          std::span<const float> picture, std::span<const float> truth) {
+  constexpr float kTexture = 0.1F;
+  if (!windows.contact(window)) return std::nullopt;
+  const ImageGrid grid = windows.image();
+  const auto texture = std::ranges::count_if(truth, [](float v) { return v > kTexture; });
+  return ContactScore{window, ssim(picture, truth, grid.height, grid.width),
+                      psnr_db(mean_squared_error(picture, truth)), 4 * texture >= std::ssize(truth)};
 }
 
-nlohmann::ordered_json PassScores::to_json() const {
+nlohmann::ordered_json scores_by_distance(const WindowSet& windows, std::span<const ContactScore> scores) {
+  constexpr std::array kFromMm{0, 5, 10, 15, 20, 30};
+  std::array<ScoreSums, kFromMm.size()> parts;
+  std::size_t pass = SIZE_MAX;
+  WindowSet::Position begin{};
+  for (const ContactScore& one : scores) {
+    const WindowSet::Position here = windows.position(one.window);
+    if (windows.pass_of(one.window) != pass) pass = windows.pass_of(one.window), begin = here;
+    const double slid = std::hypot(here.x_mm - begin.x_mm, here.y_mm - begin.y_mm);
+    if (!std::isfinite(slid)) continue;  // nobody knows where it was
+    std::size_t p = parts.size() - 1;
+    while (p > 0 && slid < kFromMm[p]) --p;
+    parts[p].add(one);
+  }
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    if (parts[p].windows == 0) continue;
+    json.push_back({{"from_mm", static_cast<double>(kFromMm[p])}});
+    json.back().update(parts[p].to_json());
+  }
+  return json;
+}
+
+nlohmann::ordered_json scores_by_pass(const WindowSet& windows, std::span<const ContactScore> scores) {
+  const PassSums passes = sums_of(windows, scores);
   nlohmann::ordered_json json;
-  if (passes_.size() > 1) {
-    const auto [ssim, psnr] = intervals();
+  if (passes.size() > 1) {
+    const auto [ssim, psnr] = intervals_of(windows, passes);
     json["ssim"] = {ssim.low, ssim.high}, json["psnr_mean_db"] = {psnr.low, psnr.high};
   }
   json["passes"] = nlohmann::ordered_json::array();
-  for (const auto& [pass, sums] : passes_) {
-    const WindowSet::Pass& p = windows_.passes()[pass];
-    json["passes"].push_back({{"plate", p.plate},
-                              {"trial", p.trial},
-                              {"pass", p.pass},
-                              {"windows", sums.windows},
-                              {"ssim", sums.mean_ssim()},
-                              {"psnr_mean_db", sums.mean_psnr()}});
+  for (const auto& [pass, sums] : passes) {
+    const WindowSet::Pass& p = windows.passes()[pass];
+    json["passes"].push_back({{"plate", p.plate}, {"trial", p.trial}, {"pass", p.pass}});
+    json["passes"].back().update(sums.to_json());
   }
   return json;
+}
+
+std::string interval_text(const WindowSet& windows, std::span<const ContactScore> scores) {
+  const PassSums passes = sums_of(windows, scores);
+  if (passes.size() < 2) return "";
+  const auto [ssim, psnr] = intervals_of(windows, passes);
+  return "SSIM " + format(ssim.low, 3) + " to " + format(ssim.high, 3) + ", PSNR " + format(psnr.low, 2) +
+         " to " + format(psnr.high, 2) + " dB";
 }
 
 const std::string& group_of(const WindowSet::Pass& pass) {

@@ -2,7 +2,6 @@
 // its own pictures.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -24,60 +23,27 @@ namespace supertac {
 struct ContactScore {
   std::uint32_t window;
   double ssim, psnr_db;
+  bool is_full;  ///< a quarter of the truth is texture
 };
 /// Empty for a window that is not in contact.
 std::optional<ContactScore> contact_score(const WindowSet& windows, std::uint32_t window,
                                           std::span<const float> picture, std::span<const float> truth);
-/// Over some windows in contact.
-struct ScoreSums {
-  double ssim = 0, psnr = 0;
-  std::uint64_t windows = 0;
-  void add(const ContactScore& one) { ssim += one.ssim, psnr += one.psnr_db, ++windows; }
-  double mean_ssim() const { return ssim / static_cast<double>(windows); }
-  double mean_psnr() const { return psnr / static_cast<double>(windows); }
-};
 
-/// Mean SSIM and PSNR of windows in contact, by the distance slid since the first of their pass. Two elements
-/// of a texture must have been felt before their distance tells a wide one from a narrow one: what is scored
-/// lower before that is not known yet.
-class DistanceScores {
- public:
-  explicit DistanceScores(const WindowSet& windows) : windows_(windows) {}
-  /// Windows of a pass come in the order of time.
-  void add(const ContactScore& one);
-  /// [{"from_mm", "windows", "ssim", "psnr_mean_db"}, ...], without the parts no window fell into.
-  nlohmann::ordered_json to_json() const;
+/// Mean SSIM and PSNR by the distance slid since the first of these windows of its pass; those of a pass
+/// stand in the order of time. Two elements of a texture must have been felt before their distance tells a
+/// wide one from a narrow one: what is scored lower before that is not known yet. [{"from_mm", "windows",
+/// "ssim", "psnr_mean_db"}, ...], without the parts no window fell into.
+nlohmann::ordered_json scores_by_distance(const WindowSet& windows, std::span<const ContactScore> scores);
 
- private:
-  struct Part {
-    double from_mm;
-    ScoreSums sums{};
-  };
-  const WindowSet& windows_;
-  std::array<Part, 6> parts_{{{0}, {5}, {10}, {15}, {20}, {30}}};
-  std::size_t pass_ = SIZE_MAX;
-  WindowSet::Position begin_{};
-};
-
-/// Mean SSIM and PSNR of windows in contact, by pass. Windows of one pass resemble each other, so the
-/// intervals are over passes, drawn anew within each plate: they say what other passes over these plates
-/// would give, of this one network; of one pass each, what other plates (or groups) would.
-class PassScores {
- public:
-  explicit PassScores(const WindowSet& windows) : windows_(windows) {}
-  void add(const ContactScore& one) { passes_[windows_.pass_of(one.window)].add(one); }
-  /// "SSIM 0.81 to 0.84, PSNR 20.1 to 21.0 dB", 95 %; empty where fewer than two passes were in contact.
-  std::string interval_text() const;
-  /// {"ssim": [low, high], "psnr_mean_db": [low, high], "passes": [{"plate", "trial", "pass", "windows",
-  /// "ssim", "psnr_mean_db"}, ...]}; without the intervals where they are not known
-  nlohmann::ordered_json to_json() const;
-
- private:
-  std::array<Interval, 2> intervals() const;
-
-  const WindowSet& windows_;
-  std::map<std::size_t, ScoreSums> passes_;
-};
+/// Mean SSIM and PSNR by pass. Windows of one pass resemble each other, so the intervals are over passes,
+/// drawn anew within each plate: they say what other passes over these plates would give, of this one
+/// network; of one pass each, what other plates (or groups) would. {"ssim": [low, high], "psnr_mean_db":
+/// [low, high], "passes":
+/// [{"plate", "trial", "pass", "windows", "ssim", "psnr_mean_db"}, ...]}; without the intervals where fewer
+/// than two passes were in contact.
+nlohmann::ordered_json scores_by_pass(const WindowSet& windows, std::span<const ContactScore> scores);
+/// These intervals as "SSIM 0.81 to 0.84, PSNR 20.1 to 21.0 dB", 95 %; empty where they are not known.
+std::string interval_text(const WindowSet& windows, std::span<const ContactScore> scores);
 
 /// Of a pass; its plate where it has none.
 const std::string& group_of(const WindowSet::Pass& pass);

@@ -8,7 +8,6 @@
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 #include "models/inference/evaluation.h"
-#include "models/inference/interval.h"
 
 namespace supertac {
 namespace {
@@ -83,25 +82,6 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, con
   if (tested.split.train.empty())
     throw std::runtime_error(
         "the split leaves nothing to fit the baselines on; --split none fits them to what is tested");
-}
-
-std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& windows,
-                                    std::span<const std::uint32_t> chosen, const PixelInterval& interval) {
-  std::vector<ShownWindow> shown;
-  for_each_output(network, windows, chosen, [&](const EvaluatedBatch& b) {
-    for (std::size_t n = 0; n < b.size(); ++n) {
-      const auto drawn = b.output(n), truth = b.target(n);
-      ShownWindow one{.input = mean_of_channels(windows.array(), windows.shown_frame(chosen[b.first + n])),
-                      .drawn = {drawn.begin(), drawn.end()},
-                      .truth = {truth.begin(), truth.end()},
-                      .half_widths = {}};
-      interval.with_load(network.first().format(), b.input(n), b.predicted_error(n), one.half_widths);
-      interval.half_widths(drawn, windows.image().width, one.half_widths, one.half_widths);
-      shown.push_back(std::move(one));
-    }
-    return true;
-  });
-  return shown;
 }
 
 void draw_all(const Arguments& a, const Ensemble& network, const WindowSet& windows,

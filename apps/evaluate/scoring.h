@@ -40,16 +40,6 @@ struct Drawn {
   std::span<const float> input;            ///< as the network takes it
 };
 
-/// A window as it is shown to people.
-struct ShownWindow {
-  std::vector<float> input, drawn, truth;  ///< the last frame's taxels, and pictures
-  std::vector<float> half_widths;  ///< of the pixels' 90 % intervals; empty where the network has none
-};
-
-/// The windows `chosen`, drawn once more.
-std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& windows,
-                                    std::span<const std::uint32_t> chosen, const PixelInterval& interval);
-
 /// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.
 void draw_all(const Arguments& a, const Ensemble& network, const WindowSet& windows,
               std::span<const std::uint32_t> test, const Baselines& baselines,

@@ -1,3 +1,4 @@
+// The rig's text recordings, found in their folder and registered against their plates.
 #pragma once
 
 #include <functional>

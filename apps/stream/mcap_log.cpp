@@ -132,21 +132,21 @@ McapLog::McapLog(const OutputPath& output, const TaxelArray& array, const Signal
       image_(image),
       file_(output, channels_of(array, scale.unit, image, half_widths)) {}
 
-void McapLog::add(double time_s, double wall_s, std::span<const float> signals,
-                  std::span<const float> picture, std::span<const float> half_widths) {
-  const std::uint64_t published = nanoseconds(time_s),
-                      logged = std::isnan(wall_s) ? published : nanoseconds(wall_s);
+void McapLog::add(const LiveFrame& seen) {
+  const std::span<const float> signals = seen.signals;
+  const std::uint64_t published = nanoseconds(seen.time_s),
+                      logged = std::isnan(seen.wall_s) ? published : nanoseconds(seen.wall_s);
   file_.add(0, logged, published, taxels_message(array_, signals));
   file_.add(1, logged, published,
             image_.pixels() > 0
-                ? image_message(logged, image_.height, image_.width, 1, picture)
+                ? image_message(logged, image_.height, image_.width, 1, seen.picture)
                 : image_message(logged, array_.rows, array_.columns, array_.channels, signals));
   const FrameLoad load = load_of(signals, array_.channels, scale_);
   file_.add(2, logged, published,
             Cdr().number(std::bit_cast<std::uint32_t>(static_cast<float>(load.total_force))).message());
   file_.add(3, logged, published, Cdr().number(load.saturated).message());
-  if (!half_widths.empty())
-    file_.add(4, logged, published, image_message(logged, image_.height, image_.width, 1, half_widths));
+  if (!seen.half_widths.empty())
+    file_.add(4, logged, published, image_message(logged, image_.height, image_.width, 1, seen.half_widths));
 }
 
 }  // namespace supertac

@@ -1,7 +1,9 @@
+// A stream as a file for the tools of robotics.
 #pragma once
 
 #include <string>
 
+#include "apps/stream/live_frame.h"
 #include "data/sensors/sensor.h"
 #include "io/files/mcap_file.h"
 
@@ -22,10 +24,8 @@ class McapLog {
   /// `image` without pixels: there are no pictures. `half_widths`: whether add() gets any. Throws FileError.
   McapLog(const OutputPath& output, const TaxelArray& array, const SignalScale& scale, const ImageGrid& image,
           bool half_widths);
-  /// `time_s` >= 0, of the sensor; `wall_s` since 1970, NaN where it is not known: the sensor's then stands
-  /// for it. Throws FileError.
-  void add(double time_s, double wall_s, std::span<const float> signals, std::span<const float> picture,
-           std::span<const float> half_widths);
+  /// Where the wall-clock time is not known the sensor's stands for it. Throws FileError.
+  void add(const LiveFrame& seen);
   /// Throws FileError, again when add() has.
   void close() { file_.close(); }
 

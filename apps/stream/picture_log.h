@@ -1,3 +1,4 @@
+// A stream as a safetensors file: a recording of its signals, or its pictures.
 #pragma once
 
 #include <cstdio>

@@ -1,3 +1,4 @@
+// A stream's frames become pictures here.
 #pragma once
 
 #include <optional>

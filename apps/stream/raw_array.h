@@ -1,10 +1,11 @@
+// What the array feels, without any model.
 #pragma once
 
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "apps/stream/live_state.h"
+#include "apps/stream/live_frame.h"
 #include "apps/stream/sensor_source.h"
 
 namespace supertac {

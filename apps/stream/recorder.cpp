@@ -1,6 +1,5 @@
 #include "apps/stream/recorder.h"
 
-#include <algorithm>
 #include <ctime>
 #include <utility>
 
@@ -73,7 +72,6 @@ void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name, const
     said = error.what();
   }
   const std::lock_guard lock(mutex_);
-  if (said == recorded) status_.files.push_back(name);
   status_.said = said + (why.empty() || said != recorded ? "" : "; " + why);
 }
 
@@ -94,12 +92,6 @@ Recorder::Status Recorder::status() {
   Status status = status_;
   status.seconds = seconds_;
   return status;
-}
-
-std::optional<std::string> Recorder::file(const std::string& name) {
-  const std::lock_guard lock(mutex_);
-  const auto& files = status_.files;
-  return std::find(files.begin(), files.end(), name) == files.end() ? std::nullopt : std::optional(name);
 }
 
 }  // namespace supertac

@@ -5,7 +5,6 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -34,14 +33,11 @@ class Recorder {
   void add(const LiveFrame& seen);
 
   struct Status {
-    std::string recording;           ///< name of the file under way; empty: none
-    double seconds = 0;              ///< of it
-    std::string said;                ///< what became of the last one
-    std::vector<std::string> files;  ///< complete ones
+    std::string recording;  ///< name of the file under way; empty: none
+    double seconds = 0;     ///< of it
+    std::string said;       ///< what became of the last one
   };
   Status status();
-  /// The path of one of status().files.
-  std::optional<std::string> file(const std::string& name);
 
  private:
   std::string close(const std::string& why);  // under log_mutex_: a thread writes it; what that says

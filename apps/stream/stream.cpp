@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "apps/common/running/signals.h"
+#include "apps/web/pages.h"
 #include "data/plates/plate.h"
 #include "data/recordings/recording.h"
 #include "hardware/ports/serial_port.h"
@@ -45,9 +46,6 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
       maker_(models.empty() ? nullptr : std::make_unique<PictureMaker>(models, source, settings.precision)),
       raw_(source),
       figures_s_(monotonic_seconds()) {
-  state_.array = source.array();
-  state_.scale = maker_ ? maker_->image().height / state_.array.rows : 1;
-  state_.unit = source.signal_scale().unit, state_.draws = maker_ != nullptr;
   const char* const tensor = signals_tensor(source.signal_scale());
   const PictureFormat signals{.signals = source.array().signals(), .image = {0, 0}, .tensor = tensor};
   PictureFormat format = maker_ ? maker_->format() : signals;
@@ -68,15 +66,30 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   if (maker_ && (settings.web || !settings.map.path.empty()))
     map_.emplace(maker_->image(), models.front().model->settings().timesteps > 1);
   about_lines_ = about_lines(source.array(), source.signal_scale().unit, format.image);
-  if (!settings.web) return;
-  recorder_ = std::make_unique<Recorder>(signals, recording_);
-  if (settings.draft)
-    order_ = std::make_unique<PressedOrder>(*settings.draft, source.silent(), settings.draft_file);
+  if (settings.web) open_page(signals, format);
+}
+
+void Stream::open_page(const PictureFormat& recorded, const PictureFormat& format) {
+  recorder_ = std::make_unique<Recorder>(recorded, recording_);
+  if (settings_.draft)
+    order_ = std::make_unique<PressedOrder>(*settings_.draft, source_.silent(), settings_.draft_file);
+  const TaxelArray& array = source_.array();
+  nlohmann::json hello = {{"badge", settings_.badge},
+                          {"source", settings_.source},
+                          {"rows", array.rows},
+                          {"columns", array.columns},
+                          {"channels", array.channels},
+                          {"pitch_mm", {array.pitch_mm.x, array.pitch_mm.y}},
+                          {"scale", maker_ ? format.image.height / array.rows : 1},
+                          {"predicts_error", format.half_widths},
+                          {"unit", source_.signal_scale().unit},
+                          {"draws", maker_ != nullptr},
+                          {"delay_s", maker_ ? maker_->delay_s() : 0},
+                          {"silent", source_.silent()},
+                          {"found", settings_.found},
+                          {"map", colour_map_base64()}};
   web_ = std::make_unique<WebView>(
-      *settings.web,
-      WebSource{settings.badge, settings.source, source.array(), state_.scale, format.half_widths,
-                state_.unit, state_.draws, maker_ ? maker_->delay_s() : 0, source.silent(), settings.found,
-                [this](MapCells cells) { return named(std::move(cells)); }},
+      *settings_.web, std::move(hello), [this](MapCells cells) { return named(std::move(cells)); },
       *recorder_, order_.get());
 }
 
@@ -279,7 +292,7 @@ void Stream::keep_raw(const SensorFrame& frame) {
 
 void Stream::output(const LiveFrame& seen) {
   if (log_) log_->add(seen);
-  if (mcap_) mcap_->add(seen.time_s, seen.wall_s, seen.signals, seen.picture, seen.half_widths);
+  if (mcap_) mcap_->add(seen);
   if (!pipe_) return;
   const SignalScale scale = source_.signal_scale();
   const FrameLoad load = load_of(seen.signals, source_.array().channels, scale);

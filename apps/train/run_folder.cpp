@@ -7,7 +7,7 @@
 #include <sstream>
 #include <utility>
 
-#include "apps/web/result_page.h"
+#include "apps/web/pages.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"

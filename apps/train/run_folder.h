@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "io/files/folder_lock.h"
+#include "io/files/file.h"
 #include "models/training/train.h"
 
 namespace supertac {

@@ -18,9 +18,12 @@ string(REPLACE "{{class}}" "${CLASS}" page "${page}")
 string(REPLACE "{{style}}" "${all_STYLES}" page "${page}")
 string(REPLACE "{{body}}" "${body}" page "${page}")
 string(REPLACE "{{script}}" "${all_SCRIPTS}" page "${page}")
-file(WRITE ${OUTPUT} "#include \"apps/web/pages.h\"
+file(WRITE ${OUTPUT} "#include <string_view>
 
-std::string_view supertac::${NAME}() {
+namespace supertac {
+std::string_view ${NAME}();
+std::string_view ${NAME}() {
   return R\"page~(${page})page~\";
+}
 }
 ")

@@ -1,13 +1,11 @@
 #include "apps/web/web_server.h"
 
 #include <arpa/inet.h>
-#include <fcntl.h>
 #include <microhttpd.h>
 #include <netinet/in.h>
 #include <pthread.h>
 #include <sys/random.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,7 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "apps/web/encode.h"
+#include "apps/common/command_line/arguments.h"
 #include "apps/web/pages.h"
 #include "io/numbers/clock.h"
 #include "io/numbers/numbers.h"
@@ -91,6 +89,30 @@ bool is_numeric(const std::string& host) {
 }
 
 }  // namespace
+
+void declare_web(Arguments& a) {
+  a.option_alone("web", "[ADDRESS:]PORT",
+                 "show a live page in a browser on this computer (default port 8080), or with an address "
+                 "(0.0.0.0 for all) to the network, its buttons included",
+                 "8080");
+}
+
+std::optional<WebAddress> web_address(const Arguments& a) {
+  if (!a.given("web")) return std::nullopt;
+  const std::string text = a.text("web");
+  const std::size_t port_at = text.find(':') + 1;  // 0 where there is no address
+  WebAddress address;
+  if (port_at > 0) address.bind = text.substr(0, port_at - 1);
+  const auto port = parse_uint(text.substr(port_at));
+  if (!port || *port > 65535)
+    throw UsageError("--web: expected PORT or ADDRESS:PORT with a port from 0 to 65535, found " +
+                     in_quotes(text));
+  address.port = static_cast<std::uint16_t>(*port);
+  if (!address.is_loopback())
+    a.note("warning: --web " + text +
+           ": everybody who reaches this computer may watch, and press the page's buttons");
+  return address;
+}
 
 /// An open connection.
 struct WebServer::Peer {
@@ -178,7 +200,6 @@ struct WebRequest {
     if (path == "/") return still("text/html; charset=utf-8", server.site_.page);
     if (path == "/link.js") return still("text/javascript; charset=utf-8", link_script());
     if (path == "/events") return events();
-    if (path.starts_with("/files/") && server.site_.file) return download(std::string(path.substr(7)));
     return text(404, "there is nothing of this name");
   }
 
@@ -209,19 +230,6 @@ struct WebRequest {
     return send(200, "text/event-stream",
                 MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 4096, &WebServer::Reader::read, reader,
                                                   &WebServer::Reader::end));
-  }
-
-  MHD_Result download(const std::string& name) {
-    const std::optional<std::string> found = server.site_.file(name);
-    const int file = found ? open(found->c_str(), O_RDONLY | O_CLOEXEC) : -1;
-    struct stat status {};
-    if (file < 0) return text(404, "there is no such file");
-    if (fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
-      close(file);
-      return text(404, "there is no such file");
-    }
-    return send(200, "application/octet-stream",
-                MHD_create_response_from_fd64(static_cast<std::uint64_t>(status.st_size), file));
   }
 
   MHD_Result text(unsigned status, const std::string& line) {

@@ -16,6 +16,8 @@ struct MHD_Daemon;
 
 namespace supertac {
 
+class Arguments;
+
 /// What is served. The functions are called on the server's thread alone.
 struct WebSite {
   /// GET /
@@ -27,9 +29,6 @@ struct WebSite {
   std::function<std::string()> news;
   /// POST /NAME does what its name says and answers with a line for people.
   std::map<std::string, std::function<std::string()>, std::less<>> actions;
-  /// GET /files/NAME: the path of the file that may be fetched under this name. Names are looked up, never
-  /// put together to a path.
-  std::function<std::optional<std::string>(const std::string&)> file;
 };
 
 struct WebAddress {
@@ -37,6 +36,11 @@ struct WebAddress {
   std::string bind = "127.0.0.1";  ///< numeric; another than 127.0.0.1 is open to the network
   bool is_loopback() const { return bind == "127.0.0.1"; }
 };
+
+/// Declares --web.
+void declare_web(Arguments& a);
+/// Where the page is served; nothing without --web. Warns when the network may see it. Throws UsageError.
+std::optional<WebAddress> web_address(const Arguments& a);
 
 /// Serves a site from a thread of its own. Nobody who publishes waits for a reader: a page that is too slow
 /// misses events, and one that takes nothing for 20 s is closed. Who comes when there are kMostPeers already

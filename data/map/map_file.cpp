@@ -8,7 +8,7 @@
 #include "data/plates/plate_mesh.h"
 #include "data/plates/stl.h"
 #include "io/files/safetensors.h"
-#include "io/images/captions.h"
+#include "io/images/images.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {

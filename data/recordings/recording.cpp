@@ -11,10 +11,10 @@
 
 #include "io/files/file.h"
 #include "io/files/json.h"
-#include "io/files/provenance.h"
+#include "io/files/safetensors.h"
+#include "io/numbers/hash.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
-#include "io/numbers/sha256.h"
 #include "io/numbers/text.h"
 
 namespace supertac {

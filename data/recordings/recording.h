@@ -93,7 +93,7 @@ std::string recording_file_name(const Recording& recording);
 std::vector<std::string> list_recordings(const std::string& folder);
 
 /// Names the content of a folder's recordings (of these plates; all when empty), independent of windows, file
-/// names and provenance: SHA-256 over their sorted content hashes (io/files/provenance.h). Throws FileError.
+/// names and provenance: SHA-256 over their sorted content hashes (io/files/safetensors.h). Throws FileError.
 std::string hash_of_recordings(const std::string& folder, const std::vector<std::string>& plates);
 
 }  // namespace supertac

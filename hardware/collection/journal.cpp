@@ -12,7 +12,6 @@
 
 #include "hardware/ports/errors.h"
 #include "io/files/file.h"
-#include "io/files/sync_folder.h"
 #include "io/numbers/hash.h"
 
 namespace supertac {

@@ -1,9 +1,11 @@
-// Whole files, read with a limit and written atomically.
+// Whole files, read with a limit and written atomically, and folders that one program at a time fills.
 #pragma once
 
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -114,5 +116,28 @@ bool is_running(std::uint64_t process);
 
 /// Creates the directory and its parents where they are missing. Throws FileError.
 void make_directories(const std::string& path);
+
+/// Holds a folder (flock on the folder itself: nothing is left behind, and a killed program holds nothing).
+/// Several locks of one folder in one process are one.
+class FolderLock {
+ public:
+  /// `folder` exists. Throws FileError when another process holds it. File systems without locks lock
+  /// nothing.
+  explicit FolderLock(const std::string& folder);
+
+ private:
+  std::shared_ptr<const int> held_;
+};
+
+/// fsync of the folder that holds `path`, so that a power cut does not lose a new name. False with errno set.
+bool sync_folder_of(const std::string& path);
+
+/// Calls again as long as a signal interrupts.
+auto retry(const auto& call) {
+  for (;;) {
+    const auto result = call();
+    if (result >= 0 || errno != EINTR) return result;
+  }
+}
 
 }  // namespace supertac

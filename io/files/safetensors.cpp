@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cstring>
+#include <map>
 #include <set>
 #include <stdexcept>
 
 #include "io/files/file.h"
 #include "io/files/json.h"
-#include "io/files/provenance.h"
 #include "io/files/safetensors_header.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
@@ -17,6 +17,21 @@ namespace supertac {
 namespace {
 
 using namespace safetensors;
+
+std::string& stamp() {
+  static std::string json;
+  return json;
+}
+
+// In the order in which they lie in the file.
+std::vector<TensorToWrite> tensors_of(const SafetensorsFile& file) {
+  std::multimap<std::uint64_t, TensorToWrite> order;
+  for (const auto& [name, info] : file.tensors())
+    order.emplace(info.begin, TensorToWrite{name, info.dtype, info.shape, file.bytes(name)});
+  std::vector<TensorToWrite> tensors;
+  for (auto& [begin, tensor] : order) tensors.push_back(std::move(tensor));
+  return tensors;
+}
 
 [[noreturn]] void refuse(const std::string& path, const std::string& problem) {
   throw FileError(path, "not a safetensors file that can be read: " + problem);
@@ -269,6 +284,22 @@ void write_safetensors(const OutputPath& output, std::map<std::string, std::stri
     hand_over(tensor, [&file](std::span<const std::byte> piece) { file.write(piece); });
   }
   file.commit();
+}
+
+void set_provenance(std::string json) { stamp() = std::move(json); }
+const std::string& provenance() { return stamp(); }
+
+std::string content_hash(const SafetensorsFile& file) {
+  std::map<std::string, std::string> metadata = file.metadata();
+  metadata.erase(kProvenanceKey);
+  const std::vector<TensorToWrite> tensors = tensors_of(file);
+  const std::string text = sealed_header(std::move(metadata), tensors);
+  const std::uint64_t length = text.size();
+  Sha256 hash;
+  hash.add(std::as_bytes(std::span(&length, 1)));
+  hash.add(text);
+  for (const TensorToWrite& tensor : tensors) hash.add(tensor.data);
+  return hash.hex();
 }
 
 std::string shape_text(const std::vector<std::uint64_t>& shape) { return "[" + joined(shape) + "]"; }

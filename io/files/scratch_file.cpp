@@ -8,7 +8,6 @@
 #include <cstring>
 
 #include "io/files/file.h"
-#include "io/files/sync_folder.h"
 
 namespace supertac {
 namespace {

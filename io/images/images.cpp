@@ -1,6 +1,7 @@
 #include "io/images/images.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -10,6 +11,7 @@
 #define STB_IMAGE_WRITE_STATIC
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #define STBI_WRITE_NO_STDIO
+#include <stb/stb_easy_font.h>
 #include <stb/stb_image_write.h>
 
 namespace supertac {
@@ -52,45 +54,20 @@ void append(void* context, void* data, int size) {
   out->insert(out->end(), bytes, bytes + size);
 }
 
-int gap_of(int side) { return std::max(1, side / 16); }
+constexpr int kDot = 2;  // pixels of a dot of a letter
+constexpr int kMargin = 10, kBarHeight = 14, kBarWidth = 420;
 
-// The panel of a strip's part in the picture's corner.
-Panel panel_of(const StripLayout& l) {
-  const int longer = std::max(l.rows, l.columns);
-  return {.width = l.side * l.columns / longer, .height = l.side * l.rows / longer};
+std::string plain(std::string text) {
+  for (char& c : text)
+    if (c != '\n' && (c < ' ' || c > '~')) c = '?';
+  return text;
 }
 
-void check_strips(const char* where, std::span<const Strip> strips, const StripLayout& l) {
-  if (strips.empty()) throw std::invalid_argument(std::string(where) + ": there is no window to draw");
-  const int size = std::max(l.rows, l.columns) * l.scale;
-  if (std::min({l.rows, l.columns, l.scale}) < 1 || l.side < size)
-    throw std::invalid_argument(std::string(where) + ": pictures must have 1 to " + std::to_string(l.side) +
-                                " pixels a side, the panels' size, got " + std::to_string(size));
-}
+int lines_of(const std::string& text) { return 1 + static_cast<int>(std::ranges::count(text, '\n')); }
 
-// Panels of a strip.
-int parts_of(std::span<const Strip> strips) {
-  return std::ranges::any_of(strips, [](const Strip& s) { return !s.uncertainty.empty(); }) ? 4 : 3;
-}
-
-// Strips below each other, their parts side by side; `turned`: the other way round.
-Picture picture_of(const char* where, std::span<const Strip> strips, const StripLayout& l, bool turned) {
-  check_strips(where, strips, l);
-  const int gap = gap_of(l.side), count = static_cast<int>(strips.size()), parts = parts_of(strips);
-  Panel panel = panel_of(l);
-  const int step_x = panel.width + gap, step_y = panel.height + gap;
-  Picture picture((turned ? count : parts) * step_x + gap, (turned ? parts : count) * step_y + gap);
-  for (int i = 0; i < count; ++i) {
-    const Strip& strip = strips[static_cast<std::size_t>(i)];
-    panel.left = gap + (turned ? i * step_x : 0), panel.top = gap + (turned ? 0 : i * step_y);
-    draw_panel(picture, panel, strip.input, l.rows, l.columns);
-    for (const std::span<const float> part : {strip.output, strip.truth, strip.uncertainty}) {
-      if (part.empty()) continue;
-      (turned ? panel.top : panel.left) += turned ? step_y : step_x;
-      draw_panel(picture, panel, part, l.rows * l.scale, l.columns * l.scale);
-    }
-  }
-  return picture;
+void paste(Picture& onto, const Picture& picture, int left, int top) {
+  for (int y = 0; y < picture.height; ++y)
+    for (int x = 0; x < picture.width; ++x) onto.set(left + x, top + y, picture.at(x, y));
 }
 
 }  // namespace
@@ -147,12 +124,73 @@ void draw_panel(Picture& picture, const Panel& panel, std::span<const float> val
   }
 }
 
-Picture strip_picture(std::span<const Strip> strips, const StripLayout& layout) {
-  return picture_of("strip_picture", strips, layout, false);
+Picture panel_grid(std::span<const PanelValues> panels, int across, int side) {
+  if (panels.empty()) throw std::invalid_argument("panel_grid: there is no panel to draw");
+  for (const auto& [values, rows, columns] : panels)
+    if (std::max(rows, columns) > side)
+      throw std::invalid_argument("panel_grid: panels of " + std::to_string(side) +
+                                  " pixels cannot show more values a side, got " +
+                                  std::to_string(std::max(rows, columns)));
+  const int longer = std::max(panels.front().rows, panels.front().columns), gap = std::max(1, side / 16),
+            width = side * panels.front().columns / longer, height = side * panels.front().rows / longer,
+            count = static_cast<int>(panels.size()), down = (count + across - 1) / across;
+  Picture picture(across * (width + gap) + gap, down * (height + gap) + gap);
+  for (int i = 0; i < count; ++i) {
+    const auto& [values, rows, columns] = panels[static_cast<std::size_t>(i)];
+    const Panel panel{gap + i % across * (width + gap), gap + i / across * (height + gap), width, height};
+    if (!values.empty()) draw_panel(picture, panel, values, rows, columns);
+  }
+  return picture;
 }
 
-Picture film_picture(std::span<const Strip> strips, const StripLayout& layout) {
-  return picture_of("film_picture", strips, layout, true);
+void draw_text(Picture& picture, int left, int top, const std::string& text) {
+  struct Corner {
+    float x, y, z;
+    unsigned char colour[4];
+  };
+  constexpr std::size_t kMostRectangles = 16;  // of a letter
+  std::string letters = plain(text);
+  std::vector<std::array<Corner, 4>> rectangles(kMostRectangles * (letters.size() + 1));
+  const int count = stb_easy_font_print(0, 0, letters.data(), nullptr, rectangles.data(),
+                                        static_cast<int>(rectangles.size() * sizeof rectangles[0]));
+  rectangles.resize(static_cast<std::size_t>(count));
+  for (const auto& corners : rectangles) {
+    const auto pixel = [](int from, float dots) { return from + kDot * static_cast<int>(dots); };
+    const int right = std::min(pixel(left, corners[2].x), picture.width),
+              bottom = std::min(pixel(top, corners[2].y), picture.height);
+    for (int y = std::max(0, pixel(top, corners[0].y)); y < bottom; ++y)
+      for (int x = std::max(0, pixel(left, corners[0].x)); x < right; ++x) picture.set(x, y, {0, 0, 0});
+  }
+}
+
+int text_width(const std::string& text) {
+  std::string letters = plain(text);
+  return kDot * stb_easy_font_width(letters.data());
+}
+
+Picture captioned(const Picture& picture, const Captions& c) {
+  int left = kMargin, lines = 1;
+  for (const auto& row : c.rows) left = std::max(left, 2 * kMargin + text_width(row.text));
+  for (const auto& column : c.columns) lines = std::max(lines, lines_of(column.text));
+  const int bar = std::max({kBarWidth, text_width(c.low) + text_width(c.high) + 2 * kMargin});
+  const int width = std::max({left + picture.width, left + bar, left + text_width(c.title)}) + kMargin;
+  const int top = 2 * kMargin + kLineHeight + lines * kLineHeight, below = top + picture.height + kMargin;
+  Picture whole(width, below + kBarHeight + 2 * kMargin + kLineHeight);
+  paste(whole, picture, left, top);
+  draw_text(whole, left, kMargin, c.title);
+  for (const auto& column : c.columns)
+    draw_text(whole, left + column.at - text_width(column.text) / 2, kMargin + kLineHeight + kMargin / 2,
+              column.text);
+  for (const auto& row : c.rows)
+    draw_text(whole, left - kMargin - text_width(row.text),
+              top + row.at - kLineHeight * lines_of(row.text) / 2, row.text);
+  std::vector<float> ramp;
+  for (int x = 0; x < bar; ++x) ramp.push_back(static_cast<float>(x) / static_cast<float>(bar - 1));
+  draw_panel(whole, {left, below, bar, kBarHeight}, ramp, 1, bar);
+  const int words = below + kBarHeight + kMargin / 2;
+  draw_text(whole, left, words, c.low);
+  draw_text(whole, left + bar - text_width(c.high), words, c.high);
+  return whole;
 }
 
 std::vector<std::byte> encode_png(const Picture& picture) {

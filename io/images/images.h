@@ -1,3 +1,4 @@
+// Pictures for people: values as colours in panels, with words and a colour bar around them, as PNG.
 #pragma once
 
 #include <array>
@@ -40,27 +41,38 @@ struct Panel {
 /// Throws std::invalid_argument when values is not rows * cols or the panel leaves the picture.
 void draw_panel(Picture& picture, const Panel& panel, std::span<const float> values, int rows, int cols);
 
-/// What one window looks like. Rows grow with y, columns with x.
-struct Strip {
-  std::span<const float> input;   ///< [rows][columns], the window's last frame (mean of a taxel's channels)
-  std::span<const float> output;  ///< [rows * scale][columns * scale]
-  std::span<const float> truth;   ///< [rows * scale][columns * scale]
-  std::span<const float> uncertainty;  ///< the same, how far off the output may be; empty = not drawn
+/// What a panel of a grid shows: values [rows][columns]. It stays empty without any.
+struct PanelValues {
+  std::span<const float> values;
+  int rows, columns;
 };
 
-/// How strips are drawn: each part in a panel whose longer side has `side` pixels.
-struct StripLayout {
-  int rows = 4, columns = 4, scale = 4, side = 128;
+/// Panels of one size, row by row from the top, `across` in a row, with gaps of side / 16 pixels (at least
+/// 1). They have the shape of the first one's values; the longer side has `side` pixels. Throws
+/// std::invalid_argument when there is no panel, or one has more values a side than pixels.
+Picture panel_grid(std::span<const PanelValues> panels, int across, int side);
+
+inline constexpr int kLineHeight = 24;
+
+/// Writes lines (separated by '\n') in letters of stb_easy_font from (left, top) on; letters outside ASCII
+/// become '?', and what lies outside the picture is cut.
+void draw_text(Picture& picture, int left, int top, const std::string& text);
+/// Width of the longest line in pixels.
+int text_width(const std::string& text);
+
+struct Captions {
+  struct Heading {
+    int at = 0;  ///< pixel of the picture that it stands at
+    std::string text = {};
+  };
+  std::string title = {};
+  std::vector<Heading> columns = {},
+                       rows = {};   ///< centred above, and right of the margin beside the picture
+  std::string low = {}, high = {};  ///< what the ends of the colour bar mean
 };
 
-/// One line per strip: input | output | truth | uncertainty, if any has one, with gaps of side / 16 (at least
-/// 1). Throws std::invalid_argument when there is no strip or a size is wrong.
-Picture strip_picture(std::span<const Strip> strips, const StripLayout& layout);
-
-/// A whole pass as a film: one column per strip, in the order given; input above output above
-/// truth above uncertainty.
-/// Throws as strip_picture.
-Picture film_picture(std::span<const Strip> strips, const StripLayout& layout);
+/// The picture with title, headings and colour bar around it.
+Picture captioned(const Picture& picture, const Captions& captions);
 
 /// The picture as a PNG file's bytes.
 std::vector<std::byte> encode_png(const Picture& picture);

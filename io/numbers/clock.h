@@ -1,3 +1,4 @@
+// The clocks of the system.
 #pragma once
 
 #include <time.h>

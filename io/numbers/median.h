@@ -1,3 +1,4 @@
+// The median and other quantiles.
 #pragma once
 
 #include <algorithm>

@@ -11,8 +11,8 @@
 #include "c99_text.h"
 #include "data/windows/live_window.h"
 #include "data/windows/transforms/normalise_window.h"
+#include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
-#include "io/numbers/sha256.h"
 #include "io/numbers/text.h"
 #include "models/inference/compiled/integer_plan.h"
 

@@ -1,8 +1,8 @@
 #include "models/files/chain.h"
 
 #include "io/files/json.h"
-#include "io/files/provenance.h"
-#include "io/numbers/sha256.h"
+#include "io/files/safetensors.h"
+#include "io/numbers/hash.h"
 #include "io/numbers/text.h"
 #include "models/inference/compiled/integer_plan.h"
 

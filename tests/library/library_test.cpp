@@ -7,7 +7,7 @@
 #include "data/windows/live_window.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "io/files/file.h"
-#include "io/files/provenance.h"
+#include "io/files/safetensors.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
 #include "models/inference/compiled/compiled_model.h"

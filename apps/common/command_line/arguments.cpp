@@ -9,7 +9,6 @@
 #include <limits>
 #include <set>
 
-#include "apps/common/command_line/nearest.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/threads.h"
 #include "io/numbers/numbers.h"
@@ -58,7 +57,39 @@ std::string quoted_word(std::string_view word) {
   return quoted + "'";
 }
 
+/// Restricted Damerau-Levenshtein distance, by rows.
+std::size_t distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
+      const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+      if (swapped) row[j] = std::min(row[j], before[j - 2] + 1);
+    }
+    before.swap(last);
+    last.swap(row);
+  }
+  return last[b.size()];
+}
+
 }  // namespace
+
+std::string nearest_name(const std::string& name, const std::vector<std::string>& candidates) {
+  std::string nearest;
+  std::size_t fewest = name.size();  // a name all of whose letters differ is no hint
+  constexpr std::size_t kLongest = 64;
+  if (name.empty() || name.size() > kLongest) return nearest;
+  for (const std::string& candidate : candidates) {
+    const std::size_t changes = distance(name, candidate);
+    const bool nearer = changes < fewest || (changes == fewest && candidate.starts_with(name));
+    if (!nearer || changes > std::max<std::size_t>(2, candidate.size() / 3)) continue;
+    fewest = changes;
+    nearest = candidate;
+  }
+  return nearest;
+}
 
 Arguments::Arguments(std::string program, std::string purpose)
     : program_(std::move(program)), purpose_(std::move(purpose)) {
@@ -71,60 +102,13 @@ Arguments::Arguments(std::string program, std::string purpose)
   flag("force", "replace existing output").decides_nothing();
 }
 
-void Arguments::declare(const std::string& name, Option option) {
+Arguments& Arguments::declare(const std::string& name, Option option) {
   option.only_with = only_with_;
   option.is_more = more_;
-  if (!options_.emplace(name, std::move(option)).second) {
+  if (option.is_positional) positionals_.push_back(name);
+  if (!options_.emplace(name, std::move(option)).second)
     throw std::invalid_argument("Arguments: option " + name + " declared twice");
-  }
   order_.push_back(name);
-}
-
-Arguments& Arguments::positional(const std::string& value, const std::string& help, bool is_required) {
-  declare(value, {.value = value, .help = help, .is_required = is_required, .is_positional = true});
-  positionals_.push_back(value);
-  return *this;
-}
-
-Arguments& Arguments::required(const std::string& name, const std::string& value, const std::string& help) {
-  declare(name, {.value = value, .help = help, .is_required = true});
-  return *this;
-}
-
-Arguments& Arguments::option(const std::string& name, const std::string& value, const std::string& help,
-                             const std::string& default_value) {
-  declare(name, {.value = value, .help = help, .default_value = default_value});
-  return *this;
-}
-
-Arguments& Arguments::option_alone(const std::string& name, const std::string& value, const std::string& help,
-                                   const std::string& alone) {
-  declare(name, {.value = "[" + value + "]", .help = help, .alone = alone});
-  return *this;
-}
-
-Arguments& Arguments::flag(const std::string& name, const std::string& help) {
-  declare(name, {.help = help, .is_flag = true});
-  return *this;
-}
-
-Arguments& Arguments::only_with(const std::string& option) {
-  only_with_ = option;
-  return *this;
-}
-
-Arguments& Arguments::writes() {
-  options_.at(order_.back()).writes = true;
-  return *this;
-}
-
-Arguments& Arguments::decides_nothing() {
-  options_.at(order_.back()).decides = false;
-  return *this;
-}
-
-Arguments& Arguments::more(bool on) {
-  more_ = on;
   return *this;
 }
 
@@ -210,26 +194,22 @@ void Arguments::parse(int argc, const char* const* argv) {
     throw UsageError(error.what());
   }
   if (given("help") || given("version")) return;
-  check_complete();
-  check_names_given();
-  check_together();
+  check_given();
 }
 
-void Arguments::check_complete() const {
+void Arguments::check_given() const {
   for (const std::string& name : order_) {
     const Option& option = options_.at(name);
-    if (!option.is_required || (given(name) && !values_.at(name).empty())) continue;
-    throw UsageError("missing " + (option.is_positional ? name : "--" + name + " " + option.value) + ": " +
-                     option.help);
-  }
-}
-
-// An empty name is a variable that was not set, not a wish to leave the option out.
-void Arguments::check_names_given() const {
-  for (const auto& [name, text] : values_) {
-    const Option& option = options_.at(name);
-    if (option.is_flag || !text.empty() || !names_path(option.value)) continue;
-    throw UsageError("--" + name + ": expected " + option.value + ", found an empty name");
+    const bool is_given = given(name), is_empty = is_given && !option.is_flag && values_.at(name).empty();
+    if (option.is_required && (!is_given || is_empty))
+      throw UsageError("missing " + (option.is_positional ? name : "--" + name + " " + option.value) + ": " +
+                       option.help);
+    // An empty name is a variable that was not set, not a wish to leave the option out.
+    if (is_empty && names_path(option.value))
+      throw UsageError("--" + name + ": expected " + option.value + ", found an empty name");
+    if (is_given && !option.only_with.empty() && !given(option.only_with))
+      throw UsageError("--" + name + ": says something beside --" + option.only_with +
+                       " only, which is not given; leave it out");
   }
 }
 
@@ -264,15 +244,6 @@ std::string Arguments::deciding_options() const {
     if (!option.is_flag) line += quoted_word(values_.at(name));
   }
   return line;
-}
-
-void Arguments::check_together() const {
-  for (const std::string& name : order_) {
-    const std::string& needed = options_.at(name).only_with;
-    if (needed.empty() || !given(name) || given(needed)) continue;
-    throw UsageError("--" + name + ": says something beside --" + needed +
-                     " only, which is not given; leave it out");
-  }
 }
 
 void Arguments::reject(const std::string& name, const std::string& expected, const std::string& found) const {

@@ -34,6 +34,11 @@ auto read_option(const std::string& option, Work work) {
   return as_usage(work, "--" + option + ": ");
 }
 
+/// The candidate with the fewest single-letter changes (insert, delete, replace, swap of neighbours) from
+/// `name`; empty when none is near: at most a third of its letters, at least two, may differ. Among equals,
+/// one that begins with `name`.
+std::string nearest_name(const std::string& name, const std::vector<std::string>& candidates);
+
 /// A file or folder that the command line names.
 struct NamedPath {
   std::string option, path;
@@ -49,25 +54,35 @@ class Arguments {
   // clause.
 
   /// An argument without a name, in the order of declaration.
-  Arguments& positional(const std::string& value, const std::string& help, bool is_required = true);
+  Arguments& positional(const std::string& value, const std::string& help, bool is_required = true) {
+    return declare(value, {.value = value, .help = help, .is_required = is_required, .is_positional = true});
+  }
   /// An option that has to be given.
-  Arguments& required(const std::string& name, const std::string& value, const std::string& help);
+  Arguments& required(const std::string& name, const std::string& value, const std::string& help) {
+    return declare(name, {.value = value, .help = help, .is_required = true});
+  }
   /// An option with a default; "" means not given.
   Arguments& option(const std::string& name, const std::string& value, const std::string& help,
-                    const std::string& default_value = "");
+                    const std::string& default_value = "") {
+    return declare(name, {.value = value, .help = help, .default_value = default_value});
+  }
   /// The same, but `alone` is its value where it is given without one.
   Arguments& option_alone(const std::string& name, const std::string& value, const std::string& help,
-                          const std::string& alone);
-  Arguments& flag(const std::string& name, const std::string& help);
+                          const std::string& alone) {
+    return declare(name, {.value = "[" + value + "]", .help = help, .alone = alone});
+  }
+  Arguments& flag(const std::string& name, const std::string& help) {
+    return declare(name, {.help = help, .is_flag = true});
+  }
   /// The options declared from here on say something beside `option` only and are refused without it; "" ends
   /// this.
-  Arguments& only_with(const std::string& option);
+  Arguments& only_with(const std::string& option) { return only_with_ = option, *this; }
   /// The option declared last names what is written; '-' is stdout.
-  Arguments& writes();
+  Arguments& writes() { return options_.at(order_.back()).writes = true, *this; }
   /// The option declared last changes no byte of what is made, so its provenance does not name it.
-  Arguments& decides_nothing();
+  Arguments& decides_nothing() { return options_.at(order_.back()).decides = false, *this; }
   /// The options declared from here on stand under "more options" in the help: few people need them.
-  Arguments& more(bool on = true);
+  Arguments& more(bool on = true) { return more_ = on, *this; }
 
   /// Throws UsageError: an unknown option (naming the nearest known one), a value missing, an argument too
   /// many or too few, an option that says nothing beside the others. --help and --version may stand without
@@ -134,12 +149,10 @@ class Arguments {
     std::string only_with{}, alone{};
   };
 
-  void declare(const std::string& name, Option option);
+  Arguments& declare(const std::string& name, Option option);
   void check_names(int argc, const char* const* argv) const;
   std::vector<std::string> complete_words(int argc, const char* const* argv) const;
-  void check_complete() const;
-  void check_names_given() const;
-  void check_together() const;
+  void check_given() const;
   [[noreturn]] void reject(const std::string& name, const std::string& expected,
                            const std::string& found) const;
 

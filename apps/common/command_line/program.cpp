@@ -1,10 +1,12 @@
 #include "apps/common/command_line/program.h"
 
+#include <fcntl.h>
 #include <omp.h>
 #include <poll.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -15,7 +17,6 @@
 #include <thread>
 #include <vector>
 
-#include "apps/common/output/outputs.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/signals.h"
 #include "io/files/file.h"
@@ -23,6 +24,8 @@
 
 namespace supertac {
 namespace {
+
+namespace fs = std::filesystem;
 
 #ifdef __clang__
 constexpr const char* kCompiler = "";  // it names itself
@@ -68,6 +71,77 @@ void check_threads(int count) {
       "cannot start " + std::to_string(count) + " threads: " + problem + " after " +
       std::to_string(threads.size() + 1) +
       "; pass fewer with --threads, or raise the limits of processes and memory (ulimit -u, -v)");
+}
+
+// By inode, or by name where they do not exist yet.
+bool are_one_file(const std::string& a, const std::string& b) {
+  std::error_code error;
+  return fs::equivalent(a, b, error) ||
+         fs::weakly_canonical(fs::absolute(a), error) == fs::weakly_canonical(fs::absolute(b), error);
+}
+
+bool is_folder(const std::string& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
+// An existing file of an input folder that an output would replace.
+bool lies_in(const std::string& file, const std::string& folder) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error) || !is_folder(folder)) return false;
+  const fs::path inside = fs::relative(file, folder, error);
+  return !error && !inside.empty() && *inside.begin() != "..";
+}
+
+void check_folder(const std::string& path) {
+  std::error_code error;
+  fs::path there = fs::absolute(path, error);
+  while (!fs::exists(fs::symlink_status(there, error)) && there.has_parent_path() &&
+         there != there.parent_path()) {
+    if (error && error.value() != ENOENT)
+      throw FileError(path, "cannot be made: " + error.message() + "; choose another name");
+    there = there.parent_path();
+  }
+  if (!is_folder(there.string()))
+    throw FileError(path, there.string() + " is not a folder, expected one; choose another place");
+  if (::access(there.c_str(), W_OK | X_OK) != 0)
+    throw FileError(path, "the folder " + there.string() + " cannot be written; choose another place");
+}
+
+// Throws UsageError when two of the outputs are one file, or an output is one of the inputs or lies among
+// them; FileError when one cannot be written where it shall be: before the work begins.
+void check_outputs(const Arguments& arguments) {
+  const std::vector<NamedPath> paths = arguments.paths();
+  for (const NamedPath& output : paths) {
+    if (!output.is_output) continue;
+    for (const NamedPath& other : paths) {
+      if (&other == &output) continue;
+      if (!are_one_file(output.path, other.path) && (other.is_output || !lies_in(output.path, other.path)))
+        continue;
+      throw UsageError("--" + output.option + ": " + in_quotes(output.path) + " would overwrite " +
+                       (other.is_output ? "the output of --" : "the input of --") + other.option +
+                       "; choose another name");
+    }
+  }
+  for (const NamedPath& output : paths) {
+    if (!output.is_output) continue;
+    if (output.is_folder) {
+      check_folder(output.path);
+    } else {
+      refuse_existing(output.path, arguments.force());
+      // Opens a temporary beside it and removes it: the name and the permission, tried.
+      const AtomicFile trial(output.path);
+    }
+  }
+}
+
+// Opens /dev/null where descriptors 0 to 2 are closed: a port opened later would otherwise get one of these
+// numbers, and a message would be sent to the device behind it.
+void open_standard_descriptors() {
+  for (int file = 0; file <= 2; ++file) {
+    // The lowest number that is free, which is this one.
+    if (::fcntl(file, F_GETFD) < 0 && errno == EBADF) (void)::open("/dev/null", O_RDWR);
+  }
 }
 
 int run(const Program& program, Arguments& arguments) {

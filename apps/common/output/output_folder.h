@@ -1,3 +1,4 @@
+// A folder of results appears whole or not at all.
 #pragma once
 
 #include <filesystem>
@@ -7,7 +8,6 @@
 #include <vector>
 
 #include "io/files/file.h"
-#include "io/files/folder_lock.h"
 
 namespace supertac {
 

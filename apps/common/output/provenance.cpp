@@ -5,8 +5,8 @@
 
 #include "apps/common/command_line/program.h"
 #include "io/files/file.h"
-#include "io/files/provenance.h"
-#include "io/numbers/sha256.h"
+#include "io/files/safetensors.h"
+#include "io/numbers/hash.h"
 
 namespace supertac {
 namespace {

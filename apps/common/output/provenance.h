@@ -1,5 +1,5 @@
 // What the files of a program say of how they were made. Safetensors files say what decides their content
-// (io/files/provenance.h), so that the same command still gives the same bytes; results, reports and folders
+// (io/files/safetensors.h), so that the same command still gives the same bytes; results, reports and folders
 // also say when it was done and how long it took.
 #pragma once
 

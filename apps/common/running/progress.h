@@ -1,3 +1,4 @@
+// How a program shows on a terminal what it is doing and how far it is.
 #pragma once
 
 #include <chrono>

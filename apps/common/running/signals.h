@@ -1,3 +1,4 @@
+// How a signal, such as Ctrl-C, ends a program.
 #pragma once
 
 namespace supertac {

@@ -1,3 +1,4 @@
+// How many threads a machine grants.
 #pragma once
 
 #include <optional>

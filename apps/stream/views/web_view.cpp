@@ -1,6 +1,5 @@
 #include "apps/stream/views/web_view.h"
 
-#include "apps/web/encode.h"
 #include "apps/web/pages.h"
 #include "data/map/elements.h"
 #include "hardware/ports/serial_port.h"
@@ -9,8 +8,13 @@ namespace supertac {
 
 constexpr double kSurfaceEveryS = 1;
 
-WebView::WebView(const WebAddress& address, const WebSource& source, Recorder& recorder, PressedOrder* order)
-    : source_(source), recorder_(recorder), order_(order), server_(address, site()) {}
+WebView::WebView(const WebAddress& address, nlohmann::json hello, std::function<NamedMap(MapCells)> surface,
+                 Recorder& recorder, PressedOrder* order)
+    : hello_(std::move(hello)),
+      of_surface_(std::move(surface)),
+      recorder_(recorder),
+      order_(order),
+      server_(address, site()) {}
 
 WebSite WebView::site() {
   WebSite site{.page = live_page(),
@@ -22,8 +26,7 @@ WebSite WebView::site() {
                               return std::string("what the array feels now counts as nothing");
                             }},
                            {"record", [this] { return recorder_.start(); }},
-                           {"stop", [this] { return recorder_.stop(); }}},
-               .file = [this](const std::string& name) { return recorder_.file(name); }};
+                           {"stop", [this] { return recorder_.stop(); }}}};
   if (order_ == nullptr) return site;
   // Begun or left as it is here: the page's newest event may be older than its last answer.
   site.actions["order"] = [this] { return order_->status().asked ? order_->leave() : order_->start(); };
@@ -46,24 +49,9 @@ bool WebView::update(const LiveState& state, const SurfaceMap* map, const MapReg
 }
 
 std::string WebView::hello() {
-  {
-    const std::lock_guard lock(mutex_);
-    tell_all_ = true;
-  }
-  return dumped({{"badge", source_.badge},
-                 {"source", source_.source},
-                 {"rows", source_.array.rows},
-                 {"columns", source_.array.columns},
-                 {"pitch_mm", {source_.array.pitch_mm.x, source_.array.pitch_mm.y}},
-                 {"scale", source_.scale},
-                 {"predicts_error", source_.predicts_error},
-                 {"unit", source_.unit},
-                 {"draws", source_.draws},
-                 {"delay_s", source_.delay_s},
-                 {"silent", source_.silent},
-                 {"found", source_.found},
-                 {"channels", source_.array.channels},
-                 {"map", colour_map_base64()}});
+  const std::lock_guard lock(mutex_);
+  tell_all_ = true;
+  return dumped(hello_);
 }
 
 std::string WebView::news() {
@@ -75,7 +63,7 @@ std::string WebView::news() {
     untold_ = {};
     if (state) std::swap(surface, surface_);
   }
-  if (!surface.region.empty()) state->surface = source_.surface(std::move(surface));
+  if (!surface.region.empty()) state->surface = of_surface_(std::move(surface));
   return state ? web_event(*state, recorder_.status()) : std::string();
 }
 
@@ -89,8 +77,7 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
                           {"dropped", state.dropped},
                           {"said", recorder.said},
                           {"recording", recorder.recording},
-                          {"recorded_s", recorder.seconds},
-                          {"files", recorder.files}};
+                          {"recorded_s", recorder.seconds}};
   if (!state.taxels.empty()) event["felt"] = levels_base64(state.taxels), event["top"] = state.top;
   if (const auto& most = state.most_changed)
     event["most"] = {

@@ -4,35 +4,23 @@
 #include <atomic>
 #include <functional>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
-#include "apps/stream/live_state.h"
+#include "apps/stream/live_frame.h"
 #include "apps/stream/recorder.h"
 #include "apps/web/web_server.h"
 
 namespace supertac {
 
-/// What a page shows besides the pictures, and what never changes.
-struct WebSource {
-  std::string badge;   ///< "board", "virtual rig", "replay", "recording"
-  std::string source;  ///< which
-  TaxelArray array;
-  int scale = 4;
-  bool predicts_error = false;
-  std::string unit = {};                           ///< of the signals
-  bool draws = false;                              ///< there is a model
-  double delay_s = 0;                              ///< of its pictures
-  std::vector<int> silent = {};                    ///< taxels that say nothing
-  std::vector<std::string> found = {};             ///< by a probe, a line each
-  std::function<NamedMap(MapCells)> surface = {};  ///< what the map's cells say; from another thread
-};
-
 /// Serves live_page() with the newest state, 30 times a second at most, from a thread of its own.
 class WebView {
  public:
+  /// `hello`: what page.js is told first. `surface`: what the map's cells say; called from another thread.
   /// `recorder` and `order`, of a page of a probe, must outlive this. Throws as WebServer.
-  WebView(const WebAddress& address, const WebSource& source, Recorder& recorder, PressedOrder* order);
+  WebView(const WebAddress& address, nlohmann::json hello, std::function<NamedMap(MapCells)> surface,
+          Recorder& recorder, PressedOrder* order);
 
   /// Never waits: a state that comes while the server takes the one before is left out, and false returned.
   /// `changed`: region of the map (null: there is none) since the last that was taken. A page that comes
@@ -49,7 +37,8 @@ class WebView {
   std::string hello();
   std::string news();
 
-  WebSource source_;
+  nlohmann::json hello_;
+  std::function<NamedMap(MapCells)> of_surface_;
   Recorder& recorder_;
   PressedOrder* order_;
   std::atomic<bool> rezero_{false};

@@ -1,3 +1,8 @@
+// How the pages' scripts relate: a page has one script, put together of files in this order (../CMakeLists.txt).
+// look.js has what all pages share. link.js brings the events of the program to the live page and to that of a
+// collection. drawing.js draws the canvases of the live page, and this file says what is on them. collect.js is the page
+// of a collection, and report.js that of results, which no program is behind.
+//
 // The live page. The server sends one "hello" with everything that stays, then an event for a picture, at most
 // 30 a second; what the page cannot draw in time it never sees.
 const HISTORY_S = 10, COLUMNS = 300;      // of the strips
@@ -178,20 +183,6 @@ function showFigures(event) {
   if (recording) set("said", `recording ${recording}, ${event.recorded_s.toFixed(1)} s`);
   else if (event.said !== heard) set("said", event.said || "none yet");
   heard = event.said;
-  showFiles(event.files || []);
-}
-
-function showFiles(names) {
-  const list = element("files");
-  if (list.childElementCount === names.length) return;
-  list.replaceChildren(...names.map((name) => {
-    const item = document.createElement("li"), link = document.createElement("a");
-    link.href = "/files/" + encodeURIComponent(name);
-    link.download = name;
-    link.textContent = name;
-    item.append(link);
-    return item;
-  }));
 }
 
 function showElements({text, rows}) {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "io/numbers/sha256.h"
+#include "io/numbers/hash.h"
 #include "models/training/trainer.h"
 
 namespace supertac {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "autograd/trace.h"
-#include "io/numbers/sha256.h"
+#include "io/numbers/hash.h"
 
 namespace supertac {
 namespace {

@@ -6,7 +6,6 @@
 #include <thread>
 
 #include "apps/common/command_line/arguments.h"
-#include "apps/common/command_line/nearest.h"
 #include "apps/common/output/output_folder.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"

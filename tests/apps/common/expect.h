@@ -1,9 +1,10 @@
-// What tests expect of programs, said in one line each.
+// What tests expect of programs, said in one line each, and folders and data for them to work on.
 #pragma once
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -52,6 +53,46 @@ class ProgramTest : public testing::Test {
   std::string bytes(const std::string& name) const { return read_text_file(path(name), 1 << 26); }
 
   TemporaryFolder folder_;
+};
+
+/// A small simulated data set that all tests of a suite share: one pass of each of two trials over 3_Bumps
+/// lie in path("data").
+class OnSimulatedData : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    succeed("supertac-simulate --out data --plates 3_Bumps --speeds 10 --passes 1");
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  // In the folder.
+  static ProcessResult run(const std::string& line, const ProcessOptions& how = {}) {
+    return run_in(folder_->path(), line, how);
+  }
+  static ProcessResult succeed(const std::string& line, const ProcessOptions& how = {}) {
+    return succeed_in(folder_->path(), line, how);
+  }
+  static std::string path(const std::string& name) { return *folder_ / name; }
+  static std::string bytes(const std::string& name) { return read_text_file(path(name), 1 << 26); }
+
+  static inline std::unique_ptr<TemporaryFolder> folder_;
+};
+
+/// A small training on simulated data, for tests of what becomes of it.
+class Training : public OnSimulatedData {
+ protected:
+  /// Of a small model in seconds; an option that is given again replaces the one before.
+  static std::string options(const std::string& out, const std::string& more = "") {
+    return " --data data --out " + out +
+           " --timesteps 32 --latent 3 --scale 2 --batch 8 --stride 8 --epochs 2 " + more;
+  }
+  static ProcessResult train(const std::string& out, const std::string& more = "") {
+    return run("supertac-train" + options(out, more));
+  }
+  /// train() that has to succeed.
+  static ProcessResult trained(const std::string& out, const std::string& more = "") {
+    return succeed("supertac-train" + options(out, more));
+  }
 };
 
 }  // namespace supertac

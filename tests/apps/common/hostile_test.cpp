@@ -9,9 +9,7 @@
 #include <fstream>
 
 #include "apps/common/command_line/arguments.h"
-#include "apps/common/output/outputs.h"
 #include "io/files/file.h"
-#include "io/files/folder_lock.h"
 #include "tests/apps/common/expect.h"
 #include "tests/sanitized.h"
 #include "tests/support/test.h"

@@ -104,11 +104,11 @@ std::string stop_among_tabs(std::uint64_t seed) {
   Dice dice(seed, 78);
   std::atomic<int> stops{0};
   const auto says = [](const char* text) { return [text] { return std::string(text); }; };
-  WebServer server({.port = 0}, {.page = "page",
-                                 .hello = says("{\"plate\":\"6_Ridges\"}"),
-                                 .news = says("{\"pass\":1}"),
-                                 .actions = {{"stop", [&stops] { return ++stops, std::string("stopped"); }}},
-                                 .file = {}});
+  WebServer server({.port = 0},
+                   {.page = "page",
+                    .hello = says("{\"plate\":\"6_Ridges\"}"),
+                    .news = says("{\"pass\":1}"),
+                    .actions = {{"stop", [&stops] { return ++stops, std::string("stopped"); }}}});
   const int port = std::stoi(server.url().substr(server.url().rfind(':') + 1));
   const std::string events = "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n";
   const std::string post =

@@ -6,7 +6,7 @@
 
 #include "io/files/safetensors.h"
 
-#include "tests/apps/common/trained.h"
+#include "tests/apps/common/expect.h"
 #include "tests/support/test.h"
 
 namespace supertac::chain_test {

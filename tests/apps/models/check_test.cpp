@@ -8,8 +8,8 @@
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
-#include "io/numbers/sha256.h"
-#include "tests/apps/common/trained.h"
+#include "io/numbers/hash.h"
+#include "tests/apps/common/expect.h"
 #include "tests/support/test.h"
 
 namespace supertac::check_test {

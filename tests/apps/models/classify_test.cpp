@@ -1,6 +1,6 @@
 // supertac-classify as a process: results, same bits, and what it refuses.
 #include "io/files/json.h"
-#include "tests/apps/common/simulated_data.h"
+#include "tests/apps/common/expect.h"
 #include "tests/support/test.h"
 
 namespace supertac::classify_test {
@@ -18,7 +18,7 @@ class Classify : public OnSimulatedData {
   }
 };
 
-const std::string kClassify = "supertac-classify --data data --stride 1 --model ";
+const std::string kClassify = "supertac-classify --data data --model ";
 
 TEST_F(Classify, CountsEveryTestWindowAndTellsTexturesApart) {
   succeed(kClassify + "trial --seeds 2 --epochs 20 --json scores.json");

@@ -9,7 +9,7 @@
 #include <sstream>
 #include <thread>
 
-#include "tests/apps/common/trained.h"
+#include "tests/apps/common/expect.h"
 
 #include "tests/support/test.h"
 

@@ -5,8 +5,8 @@
 #include "data/sensors/sensor.h"
 #include "hardware/collection/journal.h"
 #include "io/files/json.h"
-#include "io/files/provenance.h"
-#include "tests/apps/common/trained.h"
+#include "io/files/safetensors.h"
+#include "tests/apps/common/expect.h"
 #include "tests/support/test.h"
 
 namespace supertac::round_trips_test {

@@ -3,8 +3,8 @@
 #include <csignal>
 #include <sstream>
 
-#include "io/files/provenance.h"
-#include "tests/apps/common/simulated_data.h"
+#include "io/files/safetensors.h"
+#include "tests/apps/common/expect.h"
 #include "tests/support/test.h"
 
 namespace supertac::sweep_test {

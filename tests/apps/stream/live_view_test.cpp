@@ -1,8 +1,6 @@
 // What a stream shows of itself on a terminal, and how late it is.
 
-#include "apps/stream/latency_histogram.h"
-#include "apps/stream/live_state.h"
-#include "apps/stream/raw_array.h"
+#include "apps/stream/stream.h"
 #include "tests/support/test.h"
 
 namespace supertac::live_view_test {

@@ -36,12 +36,11 @@ TEST_F(RecorderTest, KeepsWhatCameBetweenStartAndStop) {
     recorder.add(seen_at(1));
     recorder.add(seen_at(1.5));
     EXPECT_EQ(recorder.status().seconds, 0.5);
-    EXPECT_EQ(recorder.file(name), std::nullopt);  // not before it is complete
+    EXPECT_FALSE(fs::exists(name));  // not before it is complete
     EXPECT_EQ(recorder.stop(), "writing " + name);
     recorder.add(seen_at(2));
     EXPECT_EQ(recorder.stop(), "nothing is being recorded");
     EXPECT_EQ(recorder.finish(), "recorded " + name);
-    EXPECT_EQ(recorder.file(name), name);
   }
   const SafetensorsFile file = SafetensorsFile::read(name);
   EXPECT_EQ(file.f64("time_s"), (std::vector<double>{1, 1.5}));
@@ -67,7 +66,6 @@ TEST_F(RecorderTest, WithoutAFrameThereIsNoFile) {
   const std::string name = recorder.status().recording;
   EXPECT_EQ(recorder.finish(), "no frame came: nothing was recorded");
   EXPECT_FALSE(fs::exists(name));
-  EXPECT_TRUE(recorder.status().files.empty());
 }
 
 TEST_F(RecorderTest, AFileThatAppearedMeanwhileStays) {

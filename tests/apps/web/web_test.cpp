@@ -7,7 +7,6 @@
 #include <random>
 
 #include "apps/stream/views/web_view.h"
-#include "apps/web/encode.h"
 #include "apps/web/pages.h"
 #include "apps/web/web_server.h"
 #include "io/files/file.h"
@@ -52,11 +51,7 @@ class Web : public testing::Test {
                   return "{\"n\":" + std::to_string(count_++) + ",\"f\":\"" + std::string(letters_, 'x') +
                          "\"}";
                 },
-            .actions = {{"record", [this] { return ++records_, std::string("recording"); }}},
-            .file =
-                [this](const std::string& name) {
-                  return name == "a.safetensors" ? std::optional(folder_ / name) : std::nullopt;
-                }};
+            .actions = {{"record", [this] { return ++records_, std::string("recording"); }}}};
   }
   std::string host() const { return "Host: 127.0.0.1:" + std::to_string(port_) + "\r\n"; }
   std::string origin() const { return "Origin: http://127.0.0.1:" + std::to_string(port_) + "\r\n"; }
@@ -76,7 +71,6 @@ class Web : public testing::Test {
   }
   bool answers() const { return get("/") == 200; }
 
-  TemporaryFolder folder_;
   std::atomic<std::size_t> letters_{0};  // of what fills an event
   std::atomic<int> count_{0}, records_{0};
   WebServer server_;
@@ -130,13 +124,9 @@ TEST_F(Web, AnActionNeedsOriginAndToken) {
 }
 
 TEST_F(Web, NoPathLeavesThePage) {
-  write_file(folder_ / "a.safetensors", "pictures");
-  write_file(folder_ / "b.safetensors", "others");
-  EXPECT_EQ(get("/files/a.safetensors"), 200);
-  for (const char* path :
-       {"/files/b.safetensors", "/files/", "/files/../a.safetensors", "/files/..%2fa.safetensors",
-        "/../etc/passwd", "//etc/passwd", "/files//etc/passwd", "/files/%2e%2e/%2e%2e/etc/passwd",
-        "/index.html", "/page.js", "/events/", "/.git/config", "http://127.0.0.1/etc/passwd"})
+  for (const char* path : {"/files/a.safetensors", "/..%2fa.safetensors", "/../etc/passwd", "//etc/passwd",
+                           "/files//etc/passwd", "/files/%2e%2e/%2e%2e/etc/passwd", "/index.html", "/page.js",
+                           "/events/", "/.git/config", "http://127.0.0.1/etc/passwd"})
     EXPECT_NE(get(path), 200) << path;
   for (const char* method : {"PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "BREW"})
     EXPECT_EQ(status_of(port_, std::string(method) + " / HTTP/1.1\r\n" + host() + "\r\n"), 405) << method;
@@ -277,8 +267,7 @@ TEST(WebServer, TheLastThatPagesHearIsWhatBecameOfTheRun) {
                  WebSite{.page = live_page(),
                          .hello = [] { return std::string("{\"a\":1}"); },
                          .news = [] { return "{\"n\":\"" + std::string(20'000, 'x') + "\"}"; },
-                         .actions = {},
-                         .file = {}});
+                         .actions = {}});
   const int port = std::stoi(server->url().substr(17));
   const std::string ask = "GET /events HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) + "\r\n\r\n";
   HttpClient stalled(port, 4096), reader(port);
@@ -293,8 +282,7 @@ TEST(WebServer, TheLastThatPagesHearIsWhatBecameOfTheRun) {
 }
 
 TEST(WebServer, AnAddressThatCannotBeHadIsNamed) {
-  const WebSite nothing{
-      .page = "", .hello = [] { return "{}"; }, .news = [] { return ""; }, .actions = {}, .file = {}};
+  const WebSite nothing{.page = "", .hello = [] { return "{}"; }, .news = [] { return ""; }, .actions = {}};
   const WebServer first({.port = 0}, nothing);
   const int port = std::stoi(first.url().substr(17));
   const auto message = [&](const WebAddress& address) {
@@ -323,12 +311,12 @@ TEST(WebView, AnEventHoldsThePictureAndWhatIsKnownOfIt) {
   state.half_widths.assign(256, 0.25F), state.distance = 2, state.unlike_training = true, state.x_mm = 3,
                                         state.y_mm = 4;
   state.most_changed = {.taxel = 5, .channel = 1, .rest = 40, .now = 35.5};
-  event = parse_json_limited(web_event(state, {.recording = "r", .said = "", .files = {"a", "b"}}));
+  event = parse_json_limited(web_event(state, {.recording = "r"}));
   EXPECT_EQ(event["wide"], levels_base64(state.half_widths));
   EXPECT_EQ(event["unlike"], true);
   EXPECT_EQ(event["most"].dump(), R"({"channel":1,"now":35.5,"rest":40.0,"taxel":5})");
   EXPECT_EQ(event["y"], 4);
-  EXPECT_EQ(event["files"].size(), 2U);
+  EXPECT_EQ(event["recording"], "r");
   state.map = {.region = {-2, 5, 2, 1}, .values = {1, NAN}, .errors = {}};
   event = parse_json_limited(web_event(state, {}));
   EXPECT_EQ(event["map"]["left"], -2);

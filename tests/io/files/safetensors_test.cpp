@@ -5,6 +5,7 @@
 #include <ctime>
 
 #include "io/files/file.h"
+#include "io/numbers/hash.h"
 #include "io/numbers/random.h"
 #include "tests/io/faults.h"
 #include "tests/sanitized.h"
@@ -304,6 +305,31 @@ TEST(Safetensors, NamesTheFirstOfManyTensors) {
   const SafetensorsFile file = SafetensorsFile::read(folder / "many");
   const std::string text = what_of<FileError>([&] { file.f32("volts"); });
   EXPECT_TRUE(text.ends_with("'tensor114', 'tensor115', ...)")) << text;
+}
+
+class Provenance : public testing::Test {
+ protected:
+  ~Provenance() override { set_provenance(""); }
+
+  std::string write(const std::string& name, float value) const {
+    const std::vector<float> a{1, 2, value}, b{4};
+    write_safetensors(
+        folder_.file(name), {{"kind", "test"}},
+        {{"z", "F32", {3}, std::as_bytes(std::span(a))}, {"a", "F32", {1}, std::as_bytes(std::span(b))}});
+    return folder_.file(name);
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Provenance, IsInEveryFileAndNotInItsContent) {
+  const std::string without = write("without", 3);
+  set_provenance(R"({"command":"supertac-test"})");
+  const std::string with = write("with", 3), other = write("other", 3.5F);
+  EXPECT_EQ(SafetensorsFile::read(with).metadata().at("provenance"), R"({"command":"supertac-test"})");
+  EXPECT_NE(read_text_file(with, kMost), read_text_file(without, kMost));
+  EXPECT_EQ(content_hash(SafetensorsFile::read(without)), sha256(read_text_file(without, kMost)));
+  EXPECT_EQ(content_hash(SafetensorsFile::read(with)), sha256(read_text_file(without, kMost)));
+  EXPECT_NE(content_hash(SafetensorsFile::read(other)), sha256(read_text_file(without, kMost)));
 }
 
 }  // namespace supertac::safetensors_test

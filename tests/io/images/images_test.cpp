@@ -10,6 +10,8 @@
 
 namespace supertac::images_test {
 
+constexpr Rgb kBlack = {0, 0, 0}, kWhite = {255, 255, 255};
+
 // CIE lightness L* of an sRGB colour.
 double lightness(Rgb colour) {
   const auto linear = [](std::uint8_t v) {
@@ -62,75 +64,40 @@ TEST(Picture, HasSidesOf1To65535Pixels) {
   EXPECT_THROW(Picture(1, 0), std::invalid_argument);
 }
 
-constexpr StripLayout kSmall{.scale = 2, .side = 16};
-
-struct Windows {
-  std::vector<float> input = std::vector<float>(16, 0.0F), output = std::vector<float>(64, 0.5F),
-                     truth = std::vector<float>(64, 1.0F);
-  Strip strip() const { return {input, output, truth, {}}; }
-};
-
-TEST(Strips, StandInputOutputTruthSideBySide) {
-  const Windows windows;
-  const std::vector<Strip> strips(2, windows.strip());
-  const Picture picture = strip_picture(strips, kSmall);
+TEST(PanelGrid, FillsRowsFromTheTopAndLeavesWhatHasNoValuesEmpty) {
+  const std::vector<float> coarse(16, 0.0F), half(64, 0.5F), full(64, 1.0F);
+  const std::vector<PanelValues> panels{{coarse, 4, 4}, {half, 8, 8}, {full, 8, 8}, {half, 8, 8}, {{}, 8, 8}};
+  const Picture picture = panel_grid(panels, 3, 16);
   EXPECT_EQ(picture.width, 3 * 16 + 4);
-  EXPECT_EQ(picture.height, 2 * 17 + 1);
-  EXPECT_EQ(picture.at(0, 0), (Rgb{255, 255, 255}));
+  EXPECT_EQ(picture.height, 2 * 16 + 3);
   EXPECT_EQ(picture.at(1, 1), colour_of(0));
-  EXPECT_EQ(picture.at(18, 18), colour_of(0.5F));
+  EXPECT_EQ(picture.at(18, 1), colour_of(0.5F));
   EXPECT_EQ(picture.at(35, 1), colour_of(1));
+  EXPECT_EQ(picture.at(1, 18), colour_of(0.5F));
+  for (const auto& [x, y] : {std::pair(0, 0), {18, 18}, {35, 18}}) EXPECT_EQ(picture.at(x, y), kWhite);
 }
 
-TEST(Strips, ShowTheDoubtBehindTheTruth) {
-  const Windows windows;
-  Strip strip = windows.strip();
-  strip.uncertainty = windows.output;
-  const std::vector<Strip> strips{windows.strip(), strip};
-  const Picture across = strip_picture(strips, kSmall), down = film_picture(strips, kSmall);
-  EXPECT_EQ(across.width, 4 * 17 + 1);
-  EXPECT_EQ(across.at(52, 1), (Rgb{255, 255, 255}));  // the first has none
-  EXPECT_EQ(across.at(52, 18), colour_of(0.5F));
-  EXPECT_EQ(down.at(18, 52), colour_of(0.5F));
+TEST(PanelGrid, KeepsTheShapeOfTheArray) {
+  const std::vector<float> input{0, 0, 0, 0, 0, 1, 0, 0}, output(32, 0.5F);
+  const Picture picture = panel_grid(std::vector<PanelValues>{{input, 2, 4}, {output, 4, 8}}, 1, 16);
+  EXPECT_EQ(picture.width, 16 + 2);
+  EXPECT_EQ(picture.height, 2 * 8 + 3);
+  EXPECT_EQ(picture.at(1 + 4, 1), colour_of(1));  // row 1 is on top
+  EXPECT_EQ(picture.at(1 + 4, 1 + 4), colour_of(0));
+  EXPECT_EQ(picture.at(1, 1 + 9), colour_of(0.5F));
 }
 
-TEST(Film, HasAColumnPerWindow) {
-  const Windows windows;
-  const std::vector<Strip> strips(5, windows.strip());
-  const Picture picture = film_picture(strips, kSmall);
-  EXPECT_EQ(picture.width, 5 * 17 + 1);
-  EXPECT_EQ(picture.height, 3 * 16 + 4);
-  EXPECT_EQ(picture.at(70, 1), colour_of(0));
-  EXPECT_EQ(picture.at(70, 18), colour_of(0.5F));
-  EXPECT_EQ(picture.at(70, 35), colour_of(1));
-}
-
-TEST(Strips, KeepTheShapeOfTheArray) {
-  const std::vector<float> input{0, 0, 0, 0, 0, 1, 0, 0}, output(32, 0.5F), truth(32, 1.0F);
-  const std::vector<Strip> strips(1, {input, output, truth, {}});
-  const StripLayout layout{.rows = 2, .columns = 4, .scale = 2, .side = 16};
-  const Picture across = strip_picture(strips, layout), down = film_picture(strips, layout);
-  EXPECT_EQ(across.width, 3 * 16 + 4);
-  EXPECT_EQ(across.height, 8 + 2);
-  EXPECT_EQ(across.at(1 + 4, 1), colour_of(1));  // row 1 is on top
-  EXPECT_EQ(across.at(1 + 4, 1 + 4), colour_of(0));
-  EXPECT_EQ(down.width, 16 + 2);
-  EXPECT_EQ(down.height, 3 * 8 + 4);
-  EXPECT_EQ(down.at(1, 1 + 2 * 9), colour_of(1));
-}
-
-TEST(Strips, RefuseNothingAndTooMuch) {
-  EXPECT_ERROR(strip_picture({}, kSmall), std::invalid_argument, "there is no window to draw");
-  const Windows windows;
-  EXPECT_THROW(film_picture(std::vector<Strip>(2000, windows.strip()), {.scale = 2, .side = 64}),
-               std::invalid_argument);
-  EXPECT_THROW(strip_picture(std::vector<Strip>(1, windows.strip()), {.scale = 4, .side = 16}),
-               std::invalid_argument);
+TEST(PanelGrid, RefusesNothingAndTooMuch) {
+  EXPECT_ERROR(panel_grid({}, 3, 16), std::invalid_argument, "there is no panel to draw");
+  const std::vector<float> values(256);
+  EXPECT_THROW(panel_grid(std::vector<PanelValues>(2000, {values, 16, 16}), 2000, 64), std::invalid_argument);
+  EXPECT_ERROR(panel_grid(std::vector<PanelValues>{{values, 16, 16}}, 1, 15), std::invalid_argument,
+               "panels of 15 pixels cannot show more values a side, got 16");
 }
 
 TEST(Png, ReadsBackAsDrawn) {
-  const Windows windows;
-  const Picture picture = strip_picture(std::vector<Strip>(1, windows.strip()), kSmall);
+  const std::vector<float> values{0, 0.5F, 0.75F, 1};
+  const Picture picture = panel_grid(std::vector<PanelValues>{{values, 2, 2}}, 1, 16);
   const std::string path = ::testing::TempDir() + "supertac_images_test.png";
   write_png(path, picture);
   const auto bytes = read_file(path, 1 << 20);
@@ -149,6 +116,47 @@ TEST(Png, ReadsBackAsDrawn) {
 
 TEST(Png, NamesAPathThatCannotBeWritten) {
   EXPECT_ERROR(write_png("/nowhere/at/all.png", Picture(2, 2)), FileError, "/nowhere/at/all.png: ");
+}
+
+int black(const Picture& picture) {
+  int count = 0;
+  for (int y = 0; y < picture.height; ++y)
+    for (int x = 0; x < picture.width; ++x) count += picture.at(x, y) == kBlack ? 1 : 0;
+  return count;
+}
+
+TEST(Text, IsDrawnWithinItsSize) {
+  const std::string word = "SSIM .85";
+  Picture picture(text_width(word) + 8, kLineHeight + 8);
+  draw_text(picture, 4, 4, word);
+  EXPECT_GT(black(picture), 100);
+  for (int x = 0; x < picture.width; ++x)
+    for (const int y : {0, 3}) EXPECT_EQ(picture.at(x, y), kWhite) << x << "," << y;
+  Picture other = picture;
+  draw_text(other, 4, 4, "SSIM .86");
+  EXPECT_NE(other.rgb, picture.rgb);
+}
+
+TEST(Text, OutsideIsCutAndForeignLettersAreQuestionMarks) {
+  Picture picture(20, 10), marks(20, 10);
+  draw_text(picture, -5, -3, "w\xff\xc3\xa4 and a long line");
+  draw_text(marks, -5, -3, "w??? and a long line");
+  EXPECT_EQ(picture.rgb, marks.rgb);
+}
+
+TEST(Captions, StandAroundThePictureWithAColourBar) {
+  const Rgb red = {255, 0, 0};
+  const Picture inside(60, 40, red);
+  const Picture whole = captioned(
+      inside, {.title = "title", .columns = {{30, "felt"}}, .rows = {{20, "a\nb"}}, .low = "0", .high = "1"});
+  int reds = 0;
+  std::set<Rgb> colours;
+  for (int y = 0; y < whole.height; ++y)
+    for (int x = 0; x < whole.width; ++x)
+      reds += whole.at(x, y) == red ? 1 : 0, colours.insert(whole.at(x, y));
+  EXPECT_EQ(reds, 60 * 40);
+  for (const float v : {0.0F, 0.5F, 1.0F}) EXPECT_TRUE(colours.contains(colour_of(v))) << v;
+  EXPECT_EQ(colours.size(), 256U + 3);  // the bar, red, black and white
 }
 
 }  // namespace supertac::images_test

@@ -2,6 +2,8 @@
 
 #include <clocale>
 
+#include "io/numbers/median.h"
+#include "io/numbers/parallel.h"
 #include "io/numbers/text.h"
 #include "tests/support/test.h"
 
@@ -43,6 +45,31 @@ TEST(Numbers, IgnoreTheLocale) {
 TEST(Text, ForeignTextCannotBreakALine) {
   EXPECT_EQ(in_quotes("a\nb\x1b[31m\xff"), "'a?b?[31m?'");
   EXPECT_EQ(in_quotes(std::string(100, 'x')), "'" + std::string(60, 'x') + "...'");
+}
+
+TEST(Median, IsTheMiddleOneOrTheUpperOfTwo) {
+  EXPECT_EQ(median(std::vector{5}), 5);
+  EXPECT_EQ(median(std::vector{9, 1, 2}), 2);
+  EXPECT_EQ(median(std::vector{9, 1, 7, 2}), 7);
+  std::vector<double> numbers{3, 3, -1, 8, 0};
+  EXPECT_EQ(median(numbers), 3);
+}
+
+TEST(ParallelFor, RunsAllAndThrowsWhatTheFirstOneThrew) {
+  std::vector<int> ran(1000);
+  parallel_for(ran.size(), [&](std::size_t i) { ++ran[i]; });
+  EXPECT_EQ(ran, std::vector<int>(1000, 1));
+  try {
+    parallel_for(ran.size(), [&](std::size_t i) {
+      ++ran[i];
+      if (i % 7 == 3) throw std::runtime_error(std::to_string(i));
+    });
+    FAIL() << "nothing was thrown";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "3");
+  }
+  EXPECT_EQ(ran, std::vector<int>(1000, 2));
+  parallel_for(0, [](std::size_t) { FAIL(); });
 }
 
 }  // namespace supertac::numbers_numbers_test

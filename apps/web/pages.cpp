@@ -1,4 +1,4 @@
-#include "apps/web/encode.h"
+#include "apps/web/pages.h"
 
 #include <vector>
 
@@ -35,6 +35,14 @@ std::string colour_map_base64() {
 
 std::string dumped(const nlohmann::json& json) {
   return json.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+}
+
+std::string result_page(const nlohmann::ordered_json& data) {
+  std::string text = data.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;) text.replace(at, 1, "\\u003c");
+  constexpr std::string_view kMark = "<!--data-->";
+  std::string page(report_page_frame());
+  return page.replace(page.find(kMark), kMark.size(), text);
 }
 
 }  // namespace supertac
