@@ -88,9 +88,7 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
     const auto one = contact_score(windows, d.example, d.pictures[0], d.target);
     scores.trust.add(d, one);
     if (one) scores.contact.push_back(*one);
-    if (outputs != nullptr)
-      outputs->add(d.input, d.pictures[0], d.target, d.predicted_error, windows.position(d.example),
-                   windows.pass_of(d.example));
+    if (outputs != nullptr) outputs->add(d);
   });
   scores.map.finish();
   return scores;
@@ -227,7 +225,7 @@ int run(Arguments& a) {
 
   std::optional<OutputFolder> pictures;
   if (a.given("pictures")) pictures.emplace(a.output("pictures"));
-  OutputsFile outputs(windows.array(), windows.frames(), windows.image());
+  OutputsFile outputs(windows);
   const Baselines baselines =
       fit_baselines(windows, tested.split.train, progress_of(a, "fitting the baselines", "parts"));
   const RecordingScores scores = score_all(a, network, files.front(), windows, tested, baselines, kinds,

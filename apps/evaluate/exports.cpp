@@ -143,34 +143,30 @@ nlohmann::ordered_json shown(const std::vector<ContactScore>& chosen, const Wind
 
 }  // namespace
 
-OutputsFile::OutputsFile(const TaxelArray& array, std::size_t timesteps, const ImageGrid& image)
-    : timesteps_(timesteps),
-      signals_(array.signals()),
-      height_(static_cast<std::uint64_t>(image.height)),
-      width_(static_cast<std::uint64_t>(image.width)) {}
-
-void OutputsFile::add(std::span<const float> window, std::span<const float> output,
-                      std::span<const float> truth, std::span<const float> predicted_error,
-                      const WindowSet::Position& position, std::size_t pass) {
-  predicted_error_.insert(predicted_error_.end(), predicted_error.begin(), predicted_error.end());
-  input_.insert(input_.end(), window.begin(), window.end());
-  output_.insert(output_.end(), output.begin(), output.end());
-  truth_.insert(truth_.end(), truth.begin(), truth.end());
+void OutputsFile::add(const Drawn& drawn) {
+  const auto append = [](std::vector<float>& to, std::span<const float> values) {
+    to.insert(to.end(), values.begin(), values.end());
+  };
+  append(input_, drawn.input), append(output_, drawn.pictures[0]);
+  append(truth_, drawn.target), append(predicted_error_, drawn.predicted_error);
+  const WindowSet::Position position = windows_.position(drawn.example);
   position_mm_.insert(position_mm_.end(), {position.x_mm, position.y_mm});
-  pass_.push_back(static_cast<std::int64_t>(pass));
-  ++count_;
+  pass_.push_back(static_cast<std::int64_t>(windows_.pass_of(drawn.example)));
 }
 
 void OutputsFile::write(const OutputPath& output) const {
   const auto bytes = [](const std::vector<float>& v) { return std::as_bytes(std::span(v)); };
+  const std::uint64_t count = pass_.size();
+  const std::vector<std::uint64_t> pictures{count, static_cast<std::uint64_t>(windows_.image().height),
+                                            static_cast<std::uint64_t>(windows_.image().width)};
   std::vector<TensorToWrite> tensors{
-      {"input", "F32", {count_, timesteps_, signals_}, bytes(input_)},
-      {"output", "F32", {count_, height_, width_}, bytes(output_)},
-      {"truth", "F32", {count_, height_, width_}, bytes(truth_)},
-      {"position_mm", "F64", {count_, 2}, std::as_bytes(std::span(position_mm_))},
-      {"pass", "I64", {count_}, std::as_bytes(std::span(pass_))}};
+      {"input", "F32", {count, windows_.frames(), windows_.array().signals()}, bytes(input_)},
+      {"output", "F32", pictures, bytes(output_)},
+      {"truth", "F32", pictures, bytes(truth_)},
+      {"position_mm", "F64", {count, 2}, std::as_bytes(std::span(position_mm_))},
+      {"pass", "I64", {count}, std::as_bytes(std::span(pass_))}};
   if (!predicted_error_.empty())
-    tensors.push_back({"predicted_error", "F32", {count_, height_, width_}, bytes(predicted_error_)});
+    tensors.push_back({"predicted_error", "F32", pictures, bytes(predicted_error_)});
   write_safetensors(output, {{"format", "supertac-outputs"}}, tensors);
 }
 

@@ -22,14 +22,13 @@ namespace supertac {
 /// unknown), and "pass" I64 [N], windows of one pass having the same number.
 class OutputsFile {
  public:
-  OutputsFile(const TaxelArray& array, std::size_t timesteps, const ImageGrid& image);
-  void add(std::span<const float> window, std::span<const float> output, std::span<const float> truth,
-           std::span<const float> predicted_error, const WindowSet::Position& position, std::size_t pass);
+  explicit OutputsFile(const WindowSet& windows) : windows_(windows) {}
+  void add(const Drawn& drawn);
   /// Throws FileError.
   void write(const OutputPath& output) const;
 
  private:
-  std::uint64_t timesteps_, signals_, height_, width_, count_ = 0;
+  const WindowSet& windows_;
   std::vector<float> input_, output_, truth_, predicted_error_;
   std::vector<double> position_mm_;
   std::vector<std::int64_t> pass_;

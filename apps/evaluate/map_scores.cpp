@@ -82,14 +82,13 @@ std::vector<std::string> MapScores::lines() const {
 }
 
 nlohmann::ordered_json MapScores::to_json() const {
-  const auto number = [](double v) { return std::isfinite(v) ? nlohmann::ordered_json(v) : nullptr; };
-  const auto middle = [&](std::vector<double> v) { return number(v.empty() ? NAN : median(v)); };
+  const auto middle = [](std::vector<double> v) { return v.empty() ? NAN : median(v); };  // NaN becomes null
   nlohmann::ordered_json json;
   for (const auto& [name, scored] :
        {std::pair("of_pass", &by_pass_), std::pair("of_surface", &by_surface_)}) {
     const Metrics contact = scored->zones.contact();
-    json[name] = {{"ssim", number(contact.ssim)},
-                  {"psnr_mean_db", number(contact.psnr_mean_db)},
+    json[name] = {{"ssim", contact.ssim},
+                  {"psnr_mean_db", contact.psnr_mean_db},
                   {"felt", scores_by_distance(windows_, scored->contact)},
                   {"over_passes", scores_by_pass(windows_, scored->contact)},
                   {"elements",
@@ -103,7 +102,7 @@ nlohmann::ordered_json MapScores::to_json() const {
     const std::vector<Element> found = elements(map);
     const bool whole = of_surface_.contains(map.name);
     auto& rows = json[whole ? "surfaces" : "passes"][map.name] = {
-        {"kind", map.kind}, {"kind_share", map.kind_share}, {"pitch_mm", number(pitch_mm(found))}};
+        {"kind", map.kind}, {"kind_share", map.kind_share}, {"pitch_mm", pitch_mm(found)}};
     if (!whole) continue;
     for (const Element& e : found)
       for (auto& row = rows["elements"].emplace_back(); const auto& [name, value] : numbers_of(e))

@@ -84,10 +84,6 @@ std::span<const float> PictureMaker::picture() {
   return output_.picture.values();
 }
 
-std::optional<double> PictureMaker::distance_limit() const {
-  return model_.novelty ? std::optional(model_.novelty->limit()) : std::nullopt;
-}
-
 PictureFormat PictureMaker::format() const {
   return {model_.array().signals(), image(), output_.predicted_error.defined(), model_.novelty.has_value()};
 }

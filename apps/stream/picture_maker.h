@@ -33,11 +33,10 @@ class PictureMaker {
     return output_.predicted_error.defined() ? output_.predicted_error.values() : std::span<const float>();
   }
   const PixelInterval& interval() const { return interval_; }
-  /// How far the window that it was drawn from is from those of training, and where "unlike" begins
-  /// (models/inference/novelty.h); nothing when the model does not say.
+  /// How far the window that it was drawn from is from those of training (models/inference/novelty.h);
+  /// nothing when the model does not say.
   std::optional<double> distance() const { return distance_; }
-  std::optional<double> distance_limit() const;
-  bool unlike_training() const { return distance_ && *distance_ > *distance_limit(); }
+  bool unlike_training() const { return distance_ && *distance_ > model_.novelty->limit(); }
 
   /// Takes these signals, in the source's unit, for "nothing": each is moved so that it rests where it rested
   /// in training, from the next frame on.

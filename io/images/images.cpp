@@ -70,6 +70,25 @@ void paste(Picture& onto, const Picture& picture, int left, int top) {
     for (int x = 0; x < picture.width; ++x) onto.set(left + x, top + y, picture.at(x, y));
 }
 
+// A rectangle of pixels in a picture.
+struct Panel {
+  int left, top, width, height;
+};
+
+// Pixels are enlarged without smoothing.
+void draw_panel(Picture& picture, const Panel& panel, const PanelValues& shown) {
+  const auto [values, rows, columns] = shown;
+  if (values.size() != static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns))
+    throw std::invalid_argument("panel_grid: expects " + std::to_string(rows) + " x " +
+                                std::to_string(columns) + " values, got " + std::to_string(values.size()));
+  for (int y = 0; y < panel.height; ++y) {
+    const int row = rows - 1 - y * rows / panel.height;
+    for (int x = 0; x < panel.width; ++x)
+      picture.set(panel.left + x, panel.top + y,
+                  colour_of(values[static_cast<std::size_t>(row * columns + x * columns / panel.width)]));
+  }
+}
+
 }  // namespace
 
 Rgb colour_of(float value) {
@@ -104,26 +123,6 @@ void Picture::set(int x, int y, Rgb colour) {
   for (std::size_t c = 0; c < 3; ++c) rgb.at(i + c) = colour[c];
 }
 
-void draw_panel(Picture& picture, const Panel& panel, std::span<const float> values, int rows, int cols) {
-  if (rows < 1 || cols < 1 ||
-      values.size() != static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols))
-    throw std::invalid_argument("draw_panel: expects " + std::to_string(rows) + " x " + std::to_string(cols) +
-                                " values, got " + std::to_string(values.size()));
-  const auto [left, top, width, height] = panel;
-  if (width < 1 || height < 1 || left < 0 || top < 0 || left + width > picture.width ||
-      top + height > picture.height)
-    throw std::invalid_argument("draw_panel: a panel of " + std::to_string(width) + " x " +
-                                std::to_string(height) + " pixels at (" + std::to_string(left) + ", " +
-                                std::to_string(top) + ") leaves the picture of " +
-                                std::to_string(picture.width) + " x " + std::to_string(picture.height));
-  for (int y = 0; y < height; ++y) {
-    const int row = rows - 1 - y * rows / height;
-    for (int x = 0; x < width; ++x)
-      picture.set(left + x, top + y,
-                  colour_of(values[static_cast<std::size_t>(row * cols + x * cols / width)]));
-  }
-}
-
 Picture panel_grid(std::span<const PanelValues> panels, int across, int side) {
   if (panels.empty()) throw std::invalid_argument("panel_grid: there is no panel to draw");
   for (const auto& [values, rows, columns] : panels)
@@ -136,9 +135,9 @@ Picture panel_grid(std::span<const PanelValues> panels, int across, int side) {
             count = static_cast<int>(panels.size()), down = (count + across - 1) / across;
   Picture picture(across * (width + gap) + gap, down * (height + gap) + gap);
   for (int i = 0; i < count; ++i) {
-    const auto& [values, rows, columns] = panels[static_cast<std::size_t>(i)];
+    const PanelValues& shown = panels[static_cast<std::size_t>(i)];
     const Panel panel{gap + i % across * (width + gap), gap + i / across * (height + gap), width, height};
-    if (!values.empty()) draw_panel(picture, panel, values, rows, columns);
+    if (!shown.values.empty()) draw_panel(picture, panel, shown);
   }
   return picture;
 }
@@ -186,7 +185,7 @@ Picture captioned(const Picture& picture, const Captions& c) {
               top + row.at - kLineHeight * lines_of(row.text) / 2, row.text);
   std::vector<float> ramp;
   for (int x = 0; x < bar; ++x) ramp.push_back(static_cast<float>(x) / static_cast<float>(bar - 1));
-  draw_panel(whole, {left, below, bar, kBarHeight}, ramp, 1, bar);
+  draw_panel(whole, {left, below, bar, kBarHeight}, {ramp, 1, bar});
   const int words = below + kBarHeight + kMargin / 2;
   draw_text(whole, left, words, c.low);
   draw_text(whole, left + bar - text_width(c.high), words, c.high);

@@ -31,17 +31,8 @@ struct Picture {
   void set(int x, int y, Rgb colour);
 };
 
-/// A rectangle of pixels in a picture.
-struct Panel {
-  int left = 0, top = 0, width = 0, height = 0;
-};
-
-/// Draws values [rows][cols] into a panel, y upwards: row 0, the smallest y, is at the bottom. Pixels are
-/// enlarged without smoothing.
-/// Throws std::invalid_argument when values is not rows * cols or the panel leaves the picture.
-void draw_panel(Picture& picture, const Panel& panel, std::span<const float> values, int rows, int cols);
-
-/// What a panel of a grid shows: values [rows][columns]. It stays empty without any.
+/// What a panel of a grid shows: values [rows][columns], y upwards: row 0, the smallest y, is at the bottom.
+/// It stays empty without any.
 struct PanelValues {
   std::span<const float> values;
   int rows, columns;
@@ -49,7 +40,8 @@ struct PanelValues {
 
 /// Panels of one size, row by row from the top, `across` in a row, with gaps of side / 16 pixels (at least
 /// 1). They have the shape of the first one's values; the longer side has `side` pixels. Throws
-/// std::invalid_argument when there is no panel, or one has more values a side than pixels.
+/// std::invalid_argument when there is no panel, or one has more values a side than pixels or not rows *
+/// columns.
 Picture panel_grid(std::span<const PanelValues> panels, int across, int side);
 
 inline constexpr int kLineHeight = 24;

@@ -161,6 +161,15 @@ int run(const Program& program, Arguments& arguments) {
   return code == kExitOk && arguments.displaced() ? kExitFailed : code;
 }
 
+std::string version_text(const Program& program) {
+  std::string text = program.name + " " + version() + "\ncommit    " + commit() + "\ncompiler  " + kCompiler +
+                     __VERSION__ + "\n";
+  if (program.kernels != nullptr)
+    text += "kernels   " + std::string(program.kernels().first) +
+            " (SUPERTAC_ISA=avx512|avx2|neon|portable|plain overrides)\n";
+  return text;
+}
+
 int parse_and_run(const Program& program, int argc, const char* const* argv) {
   Arguments arguments(program.name, program.purpose);
   program.declare(arguments);
@@ -224,14 +233,5 @@ int run_program(const Program& program, int argc, const char* const* argv) {
 }
 
 std::string version() { return SUPERTAC_VERSION; }
-
-std::string version_text(const Program& program) {
-  std::string text = program.name + " " + version() + "\ncommit    " + commit() + "\ncompiler  " + kCompiler +
-                     __VERSION__ + "\n";
-  if (program.kernels != nullptr)
-    text += "kernels   " + std::string(program.kernels().first) +
-            " (SUPERTAC_ISA=avx512|avx2|neon|portable|plain overrides)\n";
-  return text;
-}
 
 }  // namespace supertac

@@ -34,8 +34,7 @@ int run_program(const Program& program, int argc, const char* const* argv);
 /// The commit the program was built from, "-dirty" when the tree had changes; "unknown" without git. Defined
 /// in a file that the build writes.
 const char* commit();
-/// "0.2.0", and the text of --version: version, commit, compiler.
+/// "0.2.0"
 std::string version();
-std::string version_text(const Program& program);
 
 }  // namespace supertac

@@ -39,23 +39,15 @@ TEST(ColourMap, ClipsAndShowsWhatIsNotANumber) {
   EXPECT_EQ(colour_of(std::numeric_limits<float>::quiet_NaN()), (Rgb{255, 0, 0}));
 }
 
-TEST(Panel, DrawsYUpwardsAndXToTheRight) {
+TEST(PanelGrid, DrawsYUpwardsAndXToTheRight) {
   const std::vector<float> values{0, 0.25F, 0.5F, 1};  // row 0 (small y): 0, .25; row 1: .5, 1
-  Picture picture(4, 4);
-  draw_panel(picture, {0, 0, 4, 4}, values, 2, 2);
-  EXPECT_EQ(picture.at(0, 3), colour_of(0));
-  EXPECT_EQ(picture.at(3, 3), colour_of(0.25F));
-  EXPECT_EQ(picture.at(0, 0), colour_of(0.5F));
-  EXPECT_EQ(picture.at(2, 1), colour_of(1));
-}
-
-TEST(Panel, StaysInsideThePicture) {
-  Picture picture(4, 4);
-  const std::vector<float> values(4);
-  EXPECT_ERROR(draw_panel(picture, {1, 0, 4, 4}, values, 2, 2), std::invalid_argument,
-               "a panel of 4 x 4 pixels at (1, 0) leaves the picture of");
-  EXPECT_ERROR(draw_panel(picture, {0, 0, 4, 4}, values, 3, 2), std::invalid_argument,
-               "draw_panel: expects 3 x 2 values, got 4");
+  const Picture picture = panel_grid(std::vector<PanelValues>{{values, 2, 2}}, 1, 4);
+  EXPECT_EQ(picture.at(1, 4), colour_of(0));
+  EXPECT_EQ(picture.at(4, 4), colour_of(0.25F));
+  EXPECT_EQ(picture.at(1, 1), colour_of(0.5F));
+  EXPECT_EQ(picture.at(3, 2), colour_of(1));
+  EXPECT_ERROR(panel_grid(std::vector<PanelValues>{{values, 3, 2}}, 1, 4), std::invalid_argument,
+               "expects 3 x 2 values, got 4");
 }
 
 TEST(Picture, HasSidesOf1To65535Pixels) {
