@@ -1,5 +1,5 @@
 cmake_minimum_required(VERSION 3.22)
-#Run at build time : writes OUTPUT, which defines supertac::commit(), from the checkout SOURCE.
+# Run at build time: writes OUTPUT, which defines supertac::commit(), from the checkout SOURCE.
 set(commit "unknown")
 find_program(git git)
 if(git)
@@ -9,10 +9,8 @@ if(git)
     set(commit "${found}")
   endif()
 endif()
-file(CONFIGURE OUTPUT ${
-  OUTPUT} @ONLY CONTENT
+file(CONFIGURE OUTPUT ${OUTPUT} @ONLY CONTENT
 "namespace supertac { const char* commit(); }
 
-const char* supertac::commit() {
-return \"@commit@\"; }
+const char* supertac::commit() { return \"@commit@\"; }
 ")
