@@ -122,6 +122,7 @@ void Stream::run() {
     const auto frame = source_.next(kWaitS);
     if (frame && !take(*frame)) break;
     if (!frame && source_.ended()) break;
+    if (!frame && pipe_) pipe_->write_waiting();
     show();
   }
   view_.reset();

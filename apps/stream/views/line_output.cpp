@@ -5,10 +5,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 #include "apps/common/running/signals.h"
 #include "data/recordings/recording.h"
@@ -71,69 +72,33 @@ std::string about_lines(const TaxelArray& array, const std::string& unit, const 
   return text.substr(1, text.size() - 2);
 }
 
-PipeOutput::PipeOutput(int file, bool patient) : file_(file), patient_(patient), thread_([this] { run(); }) {}
-
 PipeOutput::~PipeOutput() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_ = true;
-    stopped_s_ = monotonic_seconds();
-  }
-  changed_.notify_one();
-  thread_.join();
+  for (const double end = monotonic_seconds() + kLastWaitS;
+       !gone_ && !waiting_.empty() && monotonic_seconds() < end;)
+    write_waiting(kWaitMs);
 }
 
 void PipeOutput::send(std::string line) {
-  {
-    std::unique_lock lock(mutex_);
-    while (patient_ && !gone_ && waiting_.size() == kWaiting && !interrupted())
-      changed_.wait_for(lock, std::chrono::milliseconds(kWaitMs));
-    if (gone_) throw std::runtime_error("stdout: nobody reads it any more");
-    if (waiting_.size() == kWaiting) {
-      ++lost_;
-      return;
-    }
+  while (patient_ && !gone_ && waiting_.size() == kWaiting && !interrupted()) write_waiting(kWaitMs);
+  if (waiting_.size() == kWaiting)
+    ++lost_;
+  else
     waiting_.push_back(std::move(line));
-  }
-  changed_.notify_one();
+  write_waiting();
+  if (gone_) throw std::runtime_error("stdout: nobody reads it any more");
 }
 
-void PipeOutput::run() {
-  for (std::unique_lock lock(mutex_);;) {
-    changed_.wait(lock, [this] { return stop_ || !waiting_.empty(); });
-    if (waiting_.empty()) return;
-    std::string text;
-    for (const std::string& line : waiting_) text += line;
-    waiting_.clear();
-    lock.unlock();
-    changed_.notify_one();
-    const bool written = write_all(text);
-    lock.lock();
-    if (!written) {
-      gone_ = true;
-      return;
-    }
-  }
-}
-
-// Waits in steps, so that the end of the program need not wait for a reader that has stopped. The descriptor
-// is shared with other programs and may not be made non-blocking; a pipe that polls ready takes PIPE_BUF
-// bytes.
-bool PipeOutput::write_all(const std::string& text) {
+// The descriptor is shared with other programs and may not be made non-blocking; a pipe that polls ready
+// takes PIPE_BUF bytes.
+void PipeOutput::write_waiting(int wait_ms) {
   constexpr std::size_t kAtOnce = 4096;
-  for (std::size_t at = 0; at < text.size();) {
-    pollfd ready{file_, POLLOUT, 0};
-    const int polled = poll(&ready, 1, kWaitMs);
-    {
-      const std::lock_guard lock(mutex_);
-      if (stop_ && monotonic_seconds() - stopped_s_ > kLastWaitS) return false;
-    }
-    if (polled <= 0) continue;
-    const ssize_t count = ::write(file_, text.data() + at, std::min(kAtOnce, text.size() - at));
-    if (count < 0 && errno != EINTR && errno != EAGAIN) return false;
-    if (count > 0) at += static_cast<std::size_t>(count);
+  for (pollfd ready{file_, POLLOUT, 0}; !gone_ && !waiting_.empty() && poll(&ready, 1, wait_ms) > 0;) {
+    const std::string_view rest = std::string_view(waiting_.front()).substr(written_);
+    const ssize_t count = ::write(file_, rest.data(), std::min(kAtOnce, rest.size()));
+    gone_ = count < 0 && errno != EINTR && errno != EAGAIN;
+    if (count > 0) written_ += static_cast<std::size_t>(count);
+    if (written_ == waiting_.front().size()) waiting_.pop_front(), written_ = 0;
   }
-  return true;
 }
 
 }  // namespace supertac

@@ -1,11 +1,9 @@
 // Pictures for other programs, one line of JSON each.
 #pragma once
 
-#include <condition_variable>
+#include <cstdint>
 #include <deque>
-#include <mutex>
 #include <string>
-#include <thread>
 
 #include "apps/stream/live_frame.h"
 #include "data/sensors/sensor.h"
@@ -23,36 +21,31 @@ std::string picture_line(const LiveFrame& seen, const FrameLoad& load, const Sig
 /// "height":16,"width":16,"pixel_mm":0.75,"rows":4,"columns":4,"channels":1,"pitch_mm":3,"unit":"V".
 std::string about_lines(const TaxelArray& array, const std::string& unit, const ImageGrid& image);
 
-/// Writes lines to a pipe from a thread of its own. At most kWaiting lines wait for a reader that is slow;
-/// more are lost.
+/// Writes lines to a pipe and waits for nobody: what its reader does not take yet waits, at most kWaiting
+/// lines; more are lost.
 class PipeOutput {
  public:
   static constexpr std::size_t kWaiting = 2048;
 
   /// Of a descriptor that stays open. `patient`: nothing is lost, send() waits for the reader instead, until
   /// a signal comes: for what was recorded before.
-  PipeOutput(int file, bool patient);
+  PipeOutput(int file, bool patient) : file_(file), patient_(patient) {}
   /// Gives the reader a second to take what waits.
   ~PipeOutput();
   PipeOutput(const PipeOutput&) = delete;
   PipeOutput& operator=(const PipeOutput&) = delete;
   /// Throws std::runtime_error once the reader is gone.
   void send(std::string line);
+  /// Hands over what the pipe has room for, within `wait_ms` for each piece.
+  void write_waiting(int wait_ms = 0);
   std::uint64_t lost() const { return lost_; }
 
  private:
-  void run();
-  bool write_all(const std::string& text);
-
   int file_;
-  bool patient_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
+  bool patient_, gone_ = false;
   std::deque<std::string> waiting_;
-  bool stop_ = false, gone_ = false;
-  double stopped_s_ = 0;
+  std::size_t written_ = 0;  // of the first of them
   std::uint64_t lost_ = 0;
-  std::thread thread_;
 };
 
 }  // namespace supertac

@@ -311,7 +311,7 @@ TEST(WebView, AnEventHoldsThePictureAndWhatIsKnownOfIt) {
   state.half_widths.assign(256, 0.25F), state.distance = 2, state.unlike_training = true, state.x_mm = 3,
                                         state.y_mm = 4;
   state.most_changed = {.taxel = 5, .channel = 1, .rest = 40, .now = 35.5};
-  event = parse_json_limited(web_event(state, {.recording = "r"}));
+  event = parse_json_limited(web_event(state, {.recording = "r", .said = ""}));
   EXPECT_EQ(event["wide"], levels_base64(state.half_widths));
   EXPECT_EQ(event["unlike"], true);
   EXPECT_EQ(event["most"].dump(), R"({"channel":1,"now":35.5,"rest":40.0,"taxel":5})");
