@@ -1,6 +1,7 @@
-// Pages of results: each holds everything, needs nothing, and says what made it. The option that serves a page.
-#include "apps/common/command_line/arguments.h"
+// Pages of results: each holds everything, needs nothing, and says what made it. The option that serves a
+// page.
 #include "apps/web/pages.h"
+#include "apps/common/command_line/arguments.h"
 #include "apps/web/web_server.h"
 #include "data/simulation/simulator.h"
 #include "io/files/json.h"
