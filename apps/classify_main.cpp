@@ -26,7 +26,7 @@
 #include "models/files/model_file.h"
 #include "models/networks/classifier.h"
 #include "models/training/recipe.h"
-#include "models/training/task.h"
+#include "models/training/train.h"
 
 namespace supertac {
 

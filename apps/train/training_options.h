@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/common/command_line/arguments.h"
-#include "models/training/task.h"
+#include "models/training/train.h"
 
 namespace supertac {
 

@@ -34,6 +34,33 @@ struct ConvSizes {
   Dim out_pixels() const { return conv.out_height() * conv.out_width(); }
 };
 
+/// Calls meet(tap, p, q) for each pixel p of x and q of y (numbered through the batch) that a tap joins.
+/// A convolution strides over x: q = (row, column) meets p = (row stride + ky - padding, ...). A transposed
+/// one strides over y: the same pairs with p and q exchanged, and that is all the difference there is.
+template <class Meet>
+void for_each_meeting(const ConvSizes& s, Meet meet) {
+  const ConvSettings& m = s.conv;
+  const Dim fine_h = m.transposed ? m.out_height() : m.height;
+  const Dim fine_w = m.transposed ? m.out_width() : m.width;
+  const Dim coarse_h = m.transposed ? m.height : m.out_height();
+  const Dim coarse_w = m.transposed ? m.width : m.out_width();
+  for (Dim ky = 0; ky < m.kernel_h; ++ky) {
+    for (Dim kx = 0; kx < m.kernel_w; ++kx) {
+      for (Dim n = 0; n < s.images; ++n) {
+        for (Dim row = 0; row < coarse_h; ++row) {
+          for (Dim column = 0; column < coarse_w; ++column) {
+            const Dim y = row * m.stride_h + ky - m.padding_h, x = column * m.stride_w + kx - m.padding_w;
+            if (y < 0 || y >= fine_h || x < 0 || x >= fine_w) continue;  // in the padding
+            const Dim coarse = (n * coarse_h + row) * coarse_w + column, fine = (n * fine_h + y) * fine_w + x;
+            m.transposed ? meet(ky * m.kernel_w + kx, coarse, fine)
+                         : meet(ky * m.kernel_w + kx, fine, coarse);
+          }
+        }
+      }
+    }
+  }
+}
+
 /// The largest number of channels, of x or y.
 inline constexpr Dim kMaxChannels = 4096;
 /// A sum over rows is taken in pieces of this many, which are added in order.

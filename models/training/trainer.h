@@ -1,4 +1,5 @@
-// Training of a network, one visible step at a time.
+// Training of a network, one visible step at a time: what it is trained on (Objective), and who trains it
+// (Trainer).
 //
 //   Trainer trainer(windows, split.train, Objective(windows, recipe));
 //   while (!trainer.done()) report(trainer.train_step());
@@ -24,11 +25,59 @@
 
 #include "autograd/optimisers/adam.h"
 #include "data/windows/batching.h"
+#include "data/windows/windows.h"
+#include "models/files/model_file.h"
 #include "models/training/loss/collapse.h"
-#include "models/training/objective.h"
 #include "models/training/ranks.h"
+#include "models/training/recipe.h"
 
 namespace supertac {
+
+/// One batch, or a micro-batch's share of it.
+struct Batch {
+  Tensor inputs, targets;  ///< as SuperTac::input_shape() and picture_shape() have it
+  /// [N,Objective::noise()], ~ N(0,1), LD columns a group; undefined without sampling: z = mean.
+  Tensor noise;
+};
+
+/// Of a batch: the loss, and what tells a collapse (models/training/loss/collapse.h).
+struct BatchOutput {
+  Loss loss;
+  Variable picture;
+  PerGroup<Variable> means;  ///< of the latents, [N,LD] each; none for a network without latents
+};
+
+/// supertac_loss() of a recipe's network over windows that are augmented before.
+class Objective {
+ public:
+  /// For windows of this format. Throws std::invalid_argument naming the setting of the recipe.
+  Objective(const WindowSet& windows, const Recipe& recipe);
+  const SuperTac& network() const { return model_; }
+  const Recipe& recipe() const { return recipe_; }
+  /// The same with a network of its own, not yet with this one's values.
+  Objective clone() const { return {recipe_, input_, array_, Rng::zeros()}; }
+
+  BatchOutput operator()(const Batch& batch) const;
+  /// How many numbers of noise and of latents a sample has.
+  Dim noise() const { return recipe_.sampling ? latents() : 0; }
+  Dim latents() const { return recipe_.model.latents(); }
+  /// Augments a window in place; `sample` is its number since training began.
+  void augment(std::uint64_t sample, std::span<float> window) const;
+
+  /// Its settings as JSON text, to compare on resume.
+  std::string text() const { return training_text(recipe_); }
+  /// What the checkpoint says of the network and its input.
+  std::map<std::string, std::string> metadata() const { return model_metadata(recipe_.model, input_); }
+
+ private:
+  Objective(const Recipe& recipe, const InputSettings& input, const TaxelArray& array, Rng rng);
+  PerGroup<Tensor> eps_of(const Batch& batch) const;
+
+  Recipe recipe_;
+  InputSettings input_;
+  TaxelArray array_;
+  SuperTac model_;
+};
 
 struct StepReport : LossTerms {
   std::int64_t step = 0;     ///< from 1
@@ -127,17 +176,19 @@ class Trainer {
     std::string trouble;  // where the loss stopped to be finite
     std::exception_ptr error;
   };
-  void run(MicroBatch& micro_batch) const;
+  // Of one micro-batch: its windows and truths, its noise, and with both forward, loss and backward.
   void fill(MicroBatch& micro_batch) const;
   void draw_noise(MicroBatch& micro_batch) const;
+  void run(MicroBatch& micro_batch) const;
+  // Of all of them: terms of the loss and variances, into the report, and what these say.
+  void add_up_statistics(StepReport& report);
+  void check_finite(const LossTerms& terms) const;
+  void look_for_collapse(StepReport& report);
   /// Throws TrainingStopped: step, `what`, and advice.
   [[noreturn]] void stop(const std::string& what) const;
-  // In training_state.cpp:
+  // In training_state.cpp: adds up the gradients and moves the weights.
   double apply();
   void add_up_over_ranks();
-  void add_up_statistics(StepReport& report);
-  void look_for_collapse(StepReport& report);
-  void check_finite(const LossTerms& terms) const;
 
   const WindowSet& windows_;
   Objective objective_;

@@ -15,31 +15,13 @@ struct Pair {
 };
 using Pairs = std::vector<std::vector<Pair>>;  // [taps]
 
-// A transposed convolution is a convolution with the roles of input and output exchanged:
-// there the "strided" side is the input, here it is the output.
 Pairs pairs_of(const ConvSettings& s) {
-  const Dim small_h = s.transposed ? s.height : s.out_height(),
-            small_w = s.transposed ? s.width : s.out_width();
-  const Dim large_h = s.transposed ? s.out_height() : s.height,
-            large_w = s.transposed ? s.out_width() : s.width;
   Pairs pairs(static_cast<std::size_t>(s.taps()));
-  for (Dim ky = 0; ky < s.kernel_h; ++ky) {
-    for (Dim kx = 0; kx < s.kernel_w; ++kx) {
-      for (Dim y = 0; y < small_h; ++y) {
-        for (Dim x = 0; x < small_w; ++x) {
-          const Dim ly = y * s.stride_h - s.padding_h + ky, lx = x * s.stride_w - s.padding_w + kx;
-          if (ly < 0 || ly >= large_h || lx < 0 || lx >= large_w) continue;
-          const auto small = static_cast<std::int32_t>(y * small_w + x);
-          const auto large = static_cast<std::int32_t>(ly * large_w + lx);
-          pairs[static_cast<std::size_t>(ky * s.kernel_w + kx)].push_back(s.transposed ? Pair{small, large}
-                                                                                       : Pair{large, small});
-        }
-      }
-    }
-  }
-  for (auto& tap : pairs) {
-    std::sort(tap.begin(), tap.end(), [](Pair a, Pair b) { return a.output < b.output; });
-  }
+  for_each_meeting({.conv = s, .images = 1}, [&](Dim tap, Dim input, Dim output) {
+    pairs[static_cast<std::size_t>(tap)].push_back(
+        {static_cast<std::int32_t>(input), static_cast<std::int32_t>(output)});
+  });
+  for (auto& tap : pairs) std::ranges::sort(tap, {}, &Pair::output);
   return pairs;
 }
 
@@ -51,11 +33,7 @@ std::vector<Phase> phases_of(const Pairs& pairs, bool to_input, Dim height, Dim 
   std::vector<std::vector<std::int32_t>> source(pixels, std::vector<std::int32_t>(pairs.size(), -1));
   for (std::size_t t = 0; t < pairs.size(); ++t) {
     for (const Pair p : pairs[t]) {
-      if (to_input) {
-        source[static_cast<std::size_t>(p.input)][t] = p.output;
-      } else {
-        source[static_cast<std::size_t>(p.output)][t] = p.input;
-      }
+      source[static_cast<std::size_t>(to_input ? p.input : p.output)][t] = to_input ? p.output : p.input;
     }
   }
   std::vector<Phase> phases;

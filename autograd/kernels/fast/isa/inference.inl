@@ -22,13 +22,10 @@ struct Cursor {
 // P pixels by J vectors of outputs; each output is one accumulator, its sum runs over segments, then k.
 template <int P, int J, bool kPartial>
 inline void product_tile(const ProductJob& job, const real* const (&x)[P], real* const (&y)[P], Dim channel) {
-  const Dim lanes = job.cout - channel - (J - 1) * Vec::kLanes;
+  const Outputs<J, kPartial> channels(job.cout, channel);
   Vec sum[P][J];
   for (int j = 0; j < J; ++j) {
-    const real* from = job.bias + channel + j * Vec::kLanes;
-    const Vec start = job.bias == nullptr      ? Vec::broadcast(0)
-                      : kPartial && j == J - 1 ? Vec::load_part(from, lanes)
-                                               : Vec::load(from);
+    const Vec start = job.bias == nullptr ? Vec::broadcast(0) : channels.load(job.bias + channel, j);
     for (int p = 0; p < P; ++p) sum[p][j] = start;
   }
   const real* w = job.w + channel;
@@ -39,10 +36,7 @@ inline void product_tile(const ProductJob& job, const real* const (&x)[P], real*
 #pragma GCC unroll 4
     for (Dim k = 0; k < job.length; ++k, w += job.cout) {
       Vec weight[J];
-      for (int j = 0; j < J; ++j) {
-        weight[j] = kPartial && j == J - 1 ? Vec::load_part(w + j * Vec::kLanes, lanes)
-                                           : Vec::load(w + j * Vec::kLanes);
-      }
+      for (int j = 0; j < J; ++j) weight[j] = channels.load(w, j);
       for (int p = 0; p < P; ++p) {
         const Vec value = Vec::broadcast(pixel[p][k]);
         for (int j = 0; j < J; ++j) sum[p][j] = Vec::fma(value, weight[j], sum[p][j]);
@@ -50,15 +44,7 @@ inline void product_tile(const ProductJob& job, const real* const (&x)[P], real*
     }
   }
   for (int p = 0; p < P; ++p) {
-    for (int j = 0; j < J; ++j) {
-      const Vec value = rectified(sum[p][j], job.negative_slope);
-      real* to = y[p] + channel + j * Vec::kLanes;
-      if (kPartial && j == J - 1) {
-        value.store_part(to, lanes);
-      } else {
-        value.store(to);
-      }
-    }
+    for (int j = 0; j < J; ++j) channels.store(rectified(sum[p][j], job.negative_slope), y[p] + channel, j);
   }
 }
 
@@ -170,8 +156,8 @@ void planes(const PlaneJob& job, Dim x_line, const real* x, real* to) {
     transpose(job.width, job.cin, x, job.cin, to, (job.height + 2) * job.line);
 }
 
-// R rows of a vector of pixels; each pixel's sum runs over channels, then columns, then rows of the kernel.
-// R lines of O outputs by a vector of columns.
+// R lines of O outputs by a vector of columns; each pixel's sum runs over channels, then columns, then rows
+// of the kernel.
 template <int R, int O>
 inline void plane_rows(const PlaneJob& job, const PlaneOutput* outputs, const real* x, Dim at, Dim lanes) {
   Vec sum[O][R];
@@ -197,11 +183,7 @@ inline void plane_rows(const PlaneJob& job, const PlaneOutput* outputs, const re
     real* y = outputs[o].y + at;
     for (int r = 0; r < R; ++r, y += job.width) {
       const Vec value = rectified(sum[o][r], outputs[o].negative_slope);
-      if (lanes < Vec::kLanes) {
-        value.store_part(y, lanes);
-      } else {
-        value.store(y);
-      }
+      lanes < Vec::kLanes ? value.store_part(y, lanes) : value.store(y);
     }
   }
 }

@@ -17,6 +17,22 @@ ALWAYS_INLINE Vec rectified(Vec x, real negative_slope) {
                       Vec::broadcast(negative_slope == 0 ? kLeast : kInfinite));
 }
 
+// J vectors of output channels side by side, from `channel` on. Where kPartial the last is one of fewer
+// lanes.
+template <int J, bool kPartial>
+struct Outputs {
+  Outputs(Dim cout, Dim channel) : lanes(cout - channel - (J - 1) * Vec::kLanes) {}
+  ALWAYS_INLINE Vec load(const real* p, int j) const {
+    p += j * Vec::kLanes;
+    return kPartial && j == J - 1 ? Vec::load_part(p, lanes) : Vec::load(p);
+  }
+  ALWAYS_INLINE void store(Vec v, real* p, int j) const {
+    p += j * Vec::kLanes;
+    kPartial&& j == J - 1 ? v.store_part(p, lanes) : v.store(p);
+  }
+  Dim lanes;
+};
+
 // Which pixels of a tile meet a tap at the border of a map, for the maps that occur: a tile of 8 covers a row
 // of 8 (first or last pixel cut off) or two rows of 4 (first or last column, row, or both).
 template <unsigned... kSets>
@@ -40,14 +56,11 @@ struct Tile {
 
 // Adds one tap to those pixels of the tile that it does not carry into the padding.
 template <unsigned kPixels, int P, int J, bool kPartial>
-ALWAYS_INLINE void add_tap(Tile<P, J>& tile, const real* w, Dim cin, Dim cout, Dim lanes) {
+ALWAYS_INLINE void add_tap(Tile<P, J>& tile, const real* w, Dim cin, Dim cout, Outputs<J, kPartial> outputs) {
 #pragma GCC unroll 4
   for (Dim c = 0; c < cin; ++c, w += cout) {
     Vec weight[J];
-    for (int j = 0; j < J; ++j) {
-      weight[j] = kPartial && j == J - 1 ? Vec::load_part(w + j * Vec::kLanes, lanes)
-                                         : Vec::load(w + j * Vec::kLanes);
-    }
+    for (int j = 0; j < J; ++j) weight[j] = outputs.load(w, j);
     for (int p = 0; p < P; ++p) {
       if ((kPixels >> p & 1U) == 0) continue;
       const Vec value = Vec::broadcast(tile.pixel[p][c]);
@@ -62,8 +75,8 @@ struct PixelSets {
   template <int P, int J, bool kPartial>
   ALWAYS_INLINE static bool add(unsigned pixels, [[maybe_unused]] Tile<P, J>& tile,
                                 [[maybe_unused]] const real* w, [[maybe_unused]] Dim cin,
-                                [[maybe_unused]] Dim cout, [[maybe_unused]] Dim lanes) {
-    return ((pixels == kSets && (add_tap<kSets, P, J, kPartial>(tile, w, cin, cout, lanes), true)) || ...);
+                                [[maybe_unused]] Dim cout, [[maybe_unused]] Outputs<J, kPartial> channels) {
+    return ((pixels == kSets && (add_tap<kSets>(tile, w, cin, cout, channels), true)) || ...);
   }
 };
 
@@ -72,21 +85,13 @@ inline void gather_tile(const GatherJob& job, const std::int32_t* taps, Dim tap_
                         const std::int32_t* outputs, const std::int32_t* sources, const real* zeros,
                         const real* x, real* y, Dim channel) {
   constexpr unsigned kAll = (1U << P) - 1;
-  const Dim lanes = job.cout - channel - (J - 1) * Vec::kLanes;  // of the last vector; used when kPartial
+  const Outputs<J, kPartial> channels(job.cout, channel);
   Tile<P, J> tile;
   for (int p = 0; p < P; ++p) {
     const real* from = job.into == Into::add ? y + outputs[p] * job.cout + channel
                        : job.bias            ? job.bias + channel
                                              : nullptr;
-    for (int j = 0; j < J; ++j) {
-      if (from == nullptr) {
-        tile.sum[p][j] = Vec::broadcast(0);
-      } else if (kPartial && j == J - 1) {
-        tile.sum[p][j] = Vec::load_part(from + j * Vec::kLanes, lanes);
-      } else {
-        tile.sum[p][j] = Vec::load(from + j * Vec::kLanes);
-      }
-    }
+    for (int j = 0; j < J; ++j) tile.sum[p][j] = from == nullptr ? Vec::broadcast(0) : channels.load(from, j);
   }
   for (Dim t = 0; t < tap_count; ++t) {
     unsigned pixels = 0;
@@ -97,24 +102,18 @@ inline void gather_tile(const GatherJob& job, const std::int32_t* taps, Dim tap_
     }
     const real* w = job.w + taps[t] * job.cin * job.cout + channel;
     if (pixels == kAll) {
-      add_tap<kAll, P, J, kPartial>(tile, w, job.cin, job.cout, lanes);
+      add_tap<kAll>(tile, w, job.cin, job.cout, channels);
     } else if (pixels != 0 && !BorderSetsOf<P>::Type::template add<P, J, kPartial>(pixels, tile, w, job.cin,
-                                                                                   job.cout, lanes)) {
-      add_tap<kAll, P, J, kPartial>(tile, w, job.cin, job.cout, lanes);  // zeros stand for the padding
+                                                                                   job.cout, channels)) {
+      add_tap<kAll>(tile, w, job.cin, job.cout, channels);  // zeros stand for the padding
     }
   }
   // + 0 turns -0 into +0: a sum of -0 changes its sign where 0 * w is added for a tap in the padding, and not
   // where the tap is skipped, which depends on how many pixels share a tile.
   for (int p = 0; p < P; ++p) {
     real* to = y + outputs[p] * job.cout + channel;
-    for (int j = 0; j < J; ++j) {
-      const Vec value = rectified(Vec::add(tile.sum[p][j], Vec::broadcast(0)), job.negative_slope);
-      if (kPartial && j == J - 1) {
-        value.store_part(to + j * Vec::kLanes, lanes);
-      } else {
-        value.store(to + j * Vec::kLanes);
-      }
-    }
+    for (int j = 0; j < J; ++j)
+      channels.store(rectified(Vec::add(tile.sum[p][j], Vec::broadcast(0)), job.negative_slope), to, j);
   }
 }
 
@@ -207,7 +206,7 @@ void gather_rows(const GatherJob& job, const real* x, real* y, Dim rows) {
 // R rows of gw (values of cin) by J vectors of cout; the pairs of all images stream past.
 template <int R, int J, bool kPartial>
 inline void outer_tile(const OuterJob& job, Dim row, Dim channel) {
-  const Dim lanes = job.cout - channel - (J - 1) * Vec::kLanes;
+  const Outputs<J, kPartial> channels(job.cout, channel);
   const std::int32_t* inputs = job.pairs->inputs.data();
   const std::int32_t* outputs = job.pairs->outputs.data();
   const Dim count = static_cast<Dim>(job.pairs->inputs.size());
@@ -220,10 +219,7 @@ inline void outer_tile(const OuterJob& job, Dim row, Dim channel) {
   }
   const auto add_pair = [&](const real* v, const real* g) __attribute__((always_inline)) {
     Vec grad[J];
-    for (int j = 0; j < J; ++j) {
-      grad[j] = kPartial && j == J - 1 ? Vec::load_part(g + j * Vec::kLanes, lanes)
-                                       : Vec::load(g + j * Vec::kLanes);
-    }
+    for (int j = 0; j < J; ++j) grad[j] = channels.load(g, j);
     for (int r = 0; r < R; ++r) {
       const Vec value = Vec::broadcast(v[r]);
       for (int j = 0; j < J; ++j) acc[r][j] = Vec::fma(value, grad[j], acc[r][j]);
@@ -242,12 +238,9 @@ inline void outer_tile(const OuterJob& job, Dim row, Dim channel) {
   }
   for (int r = 0; r < R; ++r) {
     real* to = job.gw + (row + r) * job.cout + channel;
-    for (int j = 0; j < J; ++j, to += Vec::kLanes) {
-      const bool part = kPartial && j == J - 1;
-      Vec before = Vec::broadcast(0);
-      if (job.into == Into::add) before = part ? Vec::load_part(to, lanes) : Vec::load(to);
-      const Vec sum = Vec::add(before, acc[r][j]);
-      part ? sum.store_part(to, lanes) : sum.store(to);
+    for (int j = 0; j < J; ++j) {
+      const Vec before = job.into == Into::add ? channels.load(to, j) : Vec::broadcast(0);
+      channels.store(Vec::add(before, acc[r][j]), to, j);
     }
   }
 }

@@ -10,21 +10,12 @@ ALWAYS_INLINE Dim tile_corner(const MapTileJob& job, Dim tile) {
 
 template <class Transform>
 inline void patches_by(const MapTileJob& job, const real* x, real* places) {
-  constexpr int kSide = Transform::kIn;
-  for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
-    const real* corner = x + tile_corner<kSide - 2>(job, tile);
-    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
-      Vec from[kSide][kSide], to[kSide][kSide];
-      for (int i = 0; i < kSide; ++i) {
-        for (int j = 0; j < kSide; ++j)
-          from[i][j] = Vec::load(corner + i * job.map.line + j * job.map.pixel + c);
-      }
-      both_ways<Transform>(from, to);
-      for (int i = 0; i < kSide; ++i) {
-        for (int j = 0; j < kSide; ++j) to[i][j].store(places + (kSide * i + j) * job.step + c);
-      }
-    }
-  }
+  for_each_tile(job, places, [&](Dim tile, Dim c, real* to_place) INLINED {
+    const real* corner = x + tile_corner<Transform::kIn - 2>(job, tile) + c;
+    transform<Transform>(
+        [&](int i, int j) INLINED { return Vec::load(corner + i * job.map.line + j * job.map.pixel); },
+        [&](int i, int j, Vec to) INLINED { to.store(to_place + (Transform::kOut * i + j) * job.step); });
+  });
 }
 
 // x points at the margin's first pixel.
@@ -86,24 +77,15 @@ void places(const PlacesJob& job, const real* v, const real* u, real* m) {
 template <class Transform>
 inline void squares_by(const MapTileJob& job, const real* places, const real* bias, real negative_slope,
                        real* y) {
-  constexpr int kSide = Transform::kIn, kSquare = Transform::kOut;
-  for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
-    real* corner = y + tile_corner<kSquare>(job, tile);
-    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
-      Vec from[kSide][kSide], to[kSquare][kSquare];
-      for (int i = 0; i < kSide; ++i) {
-        for (int j = 0; j < kSide; ++j) from[i][j] = Vec::load(places + (kSide * i + j) * job.step + c);
-      }
-      both_ways<Transform>(from, to);
-      const Vec start = Vec::load(bias + c);
-      for (int i = 0; i < kSquare; ++i) {
-        for (int j = 0; j < kSquare; ++j) {
-          const Vec value = rectified(Vec::add(start, to[i][j]), negative_slope);
-          value.store(corner + i * job.map.line + j * job.map.pixel + c);
-        }
-      }
-    }
-  }
+  for_each_tile(job, places, [&](Dim tile, Dim c, const real* place) INLINED {
+    real* corner = y + tile_corner<Transform::kOut>(job, tile) + c;
+    const Vec start = Vec::load(bias + c);
+    transform<Transform>(
+        [&](int i, int j) INLINED { return Vec::load(place + (Transform::kIn * i + j) * job.step); },
+        [&](int i, int j, Vec to) INLINED {
+          rectified(Vec::add(start, to), negative_slope).store(corner + i * job.map.line + j * job.map.pixel);
+        });
+  });
 }
 
 // y points at the map's first pixel.

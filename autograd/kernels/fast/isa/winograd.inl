@@ -1,6 +1,6 @@
 // Winograd's transforms (winograd.cpp), over the same vector type as kernels.inl and included behind it.
 
-// For the points 0, 1, -1, 2, -2 and infinity, one dimension of each; both_ways() applies them to rows, then
+// For the points 0, 1, -1, 2, -2 and infinity, one dimension of each; transform() applies them to rows, then
 // columns.
 ALWAYS_INLINE Vec times(double factor, Vec v) {
   return Vec::fma(Vec::broadcast(static_cast<real>(factor)), v, Vec::broadcast(0));
@@ -98,34 +98,40 @@ struct SmallSquareTransform {
   }
 };
 
-template <class Across, class Down = Across>
-ALWAYS_INLINE void both_ways(const Vec (&from)[Down::kIn][Across::kIn], Vec (&to)[Down::kOut][Across::kOut]) {
-  Vec half[Across::kOut][Down::kIn];
-  for (int i = 0; i < Down::kIn; ++i) {
-    Vec row[Across::kOut];
-    Across::run(from[i], row);
-    for (int j = 0; j < Across::kOut; ++j) half[j][i] = row[j];
+// Applies a transform to the rows of what load(i, j) gives, then to the columns: store(i, j, result).
+template <class Transform, class Load, class Store>
+ALWAYS_INLINE void transform(Load load, Store store) {
+  constexpr int kIn = Transform::kIn, kOut = Transform::kOut;
+  Vec half[kOut][kIn];
+  for (int i = 0; i < kIn; ++i) {
+    Vec from[kIn], row[kOut];
+    for (int j = 0; j < kIn; ++j) from[j] = load(i, j);
+    Transform::run(from, row);
+    for (int j = 0; j < kOut; ++j) half[j][i] = row[j];
   }
-  for (int j = 0; j < Across::kOut; ++j) {
-    Vec column[Down::kOut];
-    Down::run(half[j], column);
-    for (int i = 0; i < Down::kOut; ++i) to[i][j] = column[i];
+  for (int j = 0; j < kOut; ++j) {
+    Vec column[kOut];
+    Transform::run(half[j], column);
+    for (int i = 0; i < kOut; ++i) store(i, j, column[i]);
+  }
+}
+// A function of transform(), which must not become a call.
+#define INLINED __attribute__((always_inline))
+
+// Calls body(tile, channel, places from there on) for each tile of a job by a vector of channels.
+template <class Job, class Places, class Body>
+ALWAYS_INLINE void for_each_tile(const Job& job, Places* places, Body body) {
+  for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
+    for (Dim c = 0; c < job.channels; c += Vec::kLanes) body(tile, c, places + c);
   }
 }
 
 template <class Transform>
 inline void filters_by(const FilterJob& job, const real* g, real* u) {
-  constexpr int kSide = Transform::kOut;
-  for (Dim k = 0; k < job.weights; k += Vec::kLanes) {
-    Vec from[3][3], to[kSide][kSide];
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) from[i][j] = Vec::load(g + (3 * i + j) * job.weights + k);
-    }
-    both_ways<Transform>(from, to);
-    for (int i = 0; i < kSide; ++i) {
-      for (int j = 0; j < kSide; ++j) to[i][j].store(u + (kSide * i + j) * job.step + k);
-    }
-  }
+  for (Dim k = 0; k < job.weights; k += Vec::kLanes)
+    transform<Transform>([&](int i, int j) INLINED { return Vec::load(g + (3 * i + j) * job.weights + k); },
+                         [&](int i, int j, Vec to)
+                             INLINED { to.store(u + (Transform::kOut * i + j) * job.step + k); });
 }
 
 void filters(const FilterJob& job, const real* g, real* u) {
@@ -133,42 +139,29 @@ void filters(const FilterJob& job, const real* g, real* u) {
 }
 
 void filter_grads(const FilterJob& job, const real* u, real* g) {
-  for (Dim k = 0; k < job.weights; k += Vec::kLanes) {
-    Vec from[6][6], to[3][3];
-    for (int i = 0; i < 6; ++i) {
-      for (int j = 0; j < 6; ++j) from[i][j] = Vec::load(u + (6 * i + j) * job.step + k);
-    }
-    both_ways<FilterGradTransform>(from, to);
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        real* weight = g + (3 * i + j) * job.weights + k;
-        const Vec before = job.into == Into::add ? Vec::load(weight) : Vec::broadcast(0);
-        Vec::add(before, to[i][j]).store(weight);
-      }
-    }
-  }
+  for (Dim k = 0; k < job.weights; k += Vec::kLanes)
+    transform<FilterGradTransform>(
+        [&](int i, int j) INLINED { return Vec::load(u + (6 * i + j) * job.step + k); },
+        [&](int i, int j, Vec to) INLINED {
+          real* weight = g + (3 * i + j) * job.weights + k;
+          const Vec before = job.into == Into::add ? Vec::load(weight) : Vec::broadcast(0);
+          Vec::add(before, to).store(weight);
+        });
 }
 
 template <class Transform>
 inline void into_places(const TileJob& job, const real* x, real* places) {
-  constexpr int kSide = Transform::kIn, kPlaces = Transform::kOut;
-  for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
-    const real* image = x + tile / job.tiles * job.image_pixels * job.channels;
+  constexpr int kSide = Transform::kIn;
+  for_each_tile(job, places, [&](Dim tile, Dim c, real* to_place) INLINED {
+    const real* image = x + tile / job.tiles * job.image_pixels * job.channels + c;
     const std::int32_t* pixels = job.pixels + tile % job.tiles * kSide * kSide;
-    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
-      Vec from[kSide][kSide], to[kPlaces][kPlaces];
-      for (int i = 0; i < kSide; ++i) {
-        for (int j = 0; j < kSide; ++j) {
+    transform<Transform>(
+        [&](int i, int j) INLINED {
           const std::int32_t pixel = pixels[kSide * i + j];
-          from[i][j] = Vec::load((pixel >= 0 ? image + pixel * job.channels : kZeros) + c);
-        }
-      }
-      both_ways<Transform>(from, to);
-      for (int i = 0; i < kPlaces; ++i) {
-        for (int j = 0; j < kPlaces; ++j) to[i][j].store(places + (kPlaces * i + j) * job.step + c);
-      }
-    }
-  }
+          return Vec::load(pixel >= 0 ? image + pixel * job.channels : kZeros);
+        },
+        [&](int i, int j, Vec to) INLINED { to.store(to_place + (Transform::kOut * i + j) * job.step); });
+  });
 }
 
 void patches(const TileJob& job, const real* x, real* places) { into_places<PatchTransform>(job, x, places); }
@@ -179,24 +172,16 @@ void square_grads(const TileJob& job, const real* gy, real* places) {
 
 void squares(const TileJob& job, const real* places, const real* bias, Into into, real negative_slope,
              real* y) {
-  constexpr int kPlaces = SquareTransform::kIn, kSide = SquareTransform::kOut;
-  for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
-    real* image = y + tile / job.tiles * job.image_pixels * job.channels;
+  constexpr int kSide = SquareTransform::kOut;
+  for_each_tile(job, places, [&](Dim tile, Dim c, const real* place) INLINED {
+    real* image = y + tile / job.tiles * job.image_pixels * job.channels + c;
     const std::int32_t* pixels = job.pixels + tile % job.tiles * kSide * kSide;
-    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
-      Vec from[kPlaces][kPlaces], to[kSide][kSide];
-      for (int i = 0; i < kPlaces; ++i) {
-        for (int j = 0; j < kPlaces; ++j) from[i][j] = Vec::load(places + (kPlaces * i + j) * job.step + c);
-      }
-      both_ways<SquareTransform>(from, to);
-      const Vec start = Vec::load((bias ? bias : kZeros) + c);
-      for (int i = 0; i < kSide; ++i) {
-        for (int j = 0; j < kSide; ++j) {
-          real* pixel = image + pixels[kSide * i + j] * job.channels + c;
-          const Vec value = Vec::add(into == Into::add ? Vec::load(pixel) : start, to[i][j]);
-          rectified(value, negative_slope).store(pixel);
-        }
-      }
-    }
-  }
+    const Vec start = Vec::load((bias ? bias : kZeros) + c);
+    transform<SquareTransform>(
+        [&](int i, int j) INLINED { return Vec::load(place + (SquareTransform::kIn * i + j) * job.step); },
+        [&](int i, int j, Vec to) INLINED {
+          real* pixel = image + pixels[kSide * i + j] * job.channels;
+          rectified(Vec::add(into == Into::add ? Vec::load(pixel) : start, to), negative_slope).store(pixel);
+        });
+  });
 }
