@@ -19,7 +19,7 @@
 #include "data/recordings/recording.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/ports/errors.h"
-#include "hardware/ports/open_port.h"
+#include "hardware/ports/port.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"

@@ -12,7 +12,7 @@
 
 #include "data/recordings/recording.h"
 #include "hardware/boards/sensor_reader.h"
-#include "hardware/ports/open_port.h"
+#include "hardware/ports/port.h"
 
 namespace supertac {
 

@@ -92,7 +92,7 @@ struct Sensor {
   SignalScale scale = {};
   Body body = Body::of_rig();
   double rate_hz = rig::kFrameRateHz;
-  std::string port = "serial:auto@7372800";  ///< as open_port() takes it (hardware/ports/open_port.h)
+  std::string port = "serial:auto@7372800";  ///< as open_port() takes it (hardware/ports/port.h)
   FrameFormat frame = {};
   std::vector<int> order =
       {};                      ///< taxel k is the order[k]-th of a frame, -1: a place without taxel; empty: k

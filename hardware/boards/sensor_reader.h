@@ -19,10 +19,11 @@
 #include "data/frames/probe.h"
 #include "data/frames/sensor_decoder.h"
 #include "data/sensors/rest_tracker.h"
-#include "hardware/ports/open_port.h"
+#include "hardware/ports/port.h"
 
 namespace supertac {
 
+/// One frame as it is handed over.
 struct ReadFrame {
   std::vector<float> signals;  ///< as Sensor::arrange() and RestTracker::follow(), in the sensor's unit
   FrameDate date;              ///< of FrameClock, of the sensor
@@ -79,8 +80,8 @@ struct ReaderSettings {
   double silence_s = 0;  ///< without a frame for so long: BoardSilent; 0: SensorReader::silence_s()
 };
 
-/// What ends it is PortUnplugged, BoardSilent or WrongDevice, the last also where a clock has another unit
-/// than the file says.
+/// Reads one sensor by a thread of its own. What ends it is PortUnplugged, BoardSilent or WrongDevice, the
+/// last also where a clock has another unit than the file says.
 class SensorReader {
  public:
   /// How long a live sensor may say nothing (s).

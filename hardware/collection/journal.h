@@ -35,6 +35,7 @@ struct JournalRecord {
   std::string text() const { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 };
 
+/// Writes one journal. Records may come from any thread; two threads of its own write and sync them.
 class JournalWriter {
  public:
   /// Creates `path` (never overwrites). `header` is one line that says what is collected. More than
@@ -79,6 +80,7 @@ class JournalWriter {
   std::thread thread_, sync_thread_;
 };
 
+/// What a journal holds, by stream; times are s of the clock of the port that was recorded.
 struct Journal {
   std::string header;
   std::map<JournalStream, std::vector<JournalRecord>> streams;

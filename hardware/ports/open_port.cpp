@@ -1,5 +1,4 @@
-#include "hardware/ports/open_port.h"
-
+// Ports by address: serial lines, sockets, files and FIFOs.
 #include <errno.h>
 #include <fcntl.h>
 #include <netdb.h>
@@ -13,7 +12,9 @@
 #include <cmath>
 #include <optional>
 
+#include "data/sensors/sensor.h"
 #include "hardware/ports/errors.h"
+#include "hardware/ports/port.h"
 #include "hardware/ports/serial_port.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"

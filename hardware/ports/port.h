@@ -4,10 +4,13 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <string>
 
 namespace supertac {
+
+struct Sensor;
 
 /// Printable, or a line break: a firmware says little else, a board's frames are mostly something else.
 constexpr bool is_text(std::byte byte) {
@@ -43,5 +46,21 @@ class Port {
   /// Throws PortTimeout when the device does not take them by `until`, PortUnplugged when it is gone.
   virtual double write(std::span<const std::byte> bytes, double until) = 0;
 };
+
+struct OpenedPort {
+  std::unique_ptr<Port> port;
+  bool live = true;     ///< the sender does not wait: a serial line or a socket, not a file or a pipe
+  bool stored = false;  ///< a file: when its bytes arrive says nothing
+};
+
+/// s: who waits for bytes looks after so long whether to go on.
+constexpr double kReadSlice = 0.05;
+
+/// `serial:DEVICE@BAUD` ("auto" finds the rig's board), udp:[HOST]:PORT (listens), tcp:HOST:PORT (connects,
+/// at most 5 s), "-" for standard input, or the path of a file or FIFO. `lines`: a datagram ends a line.
+/// `speedup` as SerialSettings. Throws PortError and its kinds.
+OpenedPort open_port(const std::string& address, bool lines = false, double speedup = 1);
+/// The port that a sensor's file names.
+OpenedPort open_port(const Sensor& sensor, double speedup = 1);
 
 }  // namespace supertac

@@ -66,19 +66,6 @@ void MarlinLink::nobody_answered() {
   throw PrinterSilent(expected + "no" + within + "check that the printer is on and the port is right");
 }
 
-void MarlinLink::refuse(const std::string& firmware, const std::string& why) const {
-  throw WrongDevice("port " + lines_.name() + ": expected Marlin or Klipper, found " + firmware + ", which " +
-                    why + "; use a printer with one of the two");
-}
-
-// GRBL answers "error:20" and "ALARM:1"; Marlin's errors are words.
-void MarlinLink::refuse_grbl(const std::string& line) const {
-  const bool numbered = line.starts_with("error:") || line.starts_with("ALARM:");
-  if (!line.starts_with("Grbl ") && !(numbered && line.size() > 6 && line[6] >= '0' && line[6] <= '9'))
-    return;
-  refuse("GRBL (" + in_quotes(line) + ")", "has no line numbers and no M400");
-}
-
 void MarlinLink::refuse_sensor() const {
   constexpr std::size_t kFewFrames = 3 * rig::kFrameBytes;
   const bool no_text = 3 * lines_.no_text() > lines_.bytes(), numbers = 2 * numbers_ > heard_;
@@ -94,7 +81,6 @@ bool MarlinLink::probe(double until) {
   while (read_line(until, line)) {
     const Reply reply = parse_reply(line);
     if (reply.kind == ReplyKind::fatal) check_alarm(reply);
-    refuse_grbl(line);
     if (reply.kind == ReplyKind::other || reply.kind == ReplyKind::error || reply.kind == ReplyKind::paused)
       complaint_ = line;
     ++heard_, numbers_ += is_of_a_sensor(line) ? 1 : 0;
@@ -125,7 +111,9 @@ void MarlinLink::read_capabilities() {
     capabilities_.klipper = firmware.starts_with("Klipper");
   }
   if (!marlin && !capabilities_.klipper)
-    refuse((firmware.empty() ? "none" : in_quotes(firmware)) + " as its name (M115)", "is neither");
+    throw WrongDevice("port " + lines_.name() + ": expected Marlin or Klipper, found " +
+                      (firmware.empty() ? "none" : in_quotes(firmware)) +
+                      " as its name (M115), which is neither; use a printer with one of the two");
 }
 
 }  // namespace supertac

@@ -19,7 +19,7 @@
 
 namespace supertac {
 
-/// A port as lines of text, each with the time at which it came.
+/// Gathers the bytes of a port to lines of text. Times are seconds of the port's clock.
 class LinePort {
  public:
   /// `port` must outlive it.
@@ -32,14 +32,14 @@ class LinePort {
   /// The next line that is not empty, without its break and trailing blanks; false when `until` (s, on the
   /// port's clock) passes first, also where bytes or lines come for ever. Throws as Port::read().
   bool read(double until, std::string& line);
-  /// The same of what has been received already.
+  /// The next line of what has been received already, without waiting; false when there is none.
   bool take(std::string& line);
-  /// What has come of a line whose break has not.
+  /// Drops the beginning of a line whose break has not come.
   void forget() { input_.erase(input_.find_last_of("\r\n") + 1); }
 
   double arrival_s() const { return arrival_s_; }   ///< of the last byte received
   std::size_t bytes() const { return bytes_; }      ///< received so far
-  std::size_t no_text() const { return no_text_; }  ///< of these, what no text has
+  std::size_t no_text() const { return no_text_; }  ///< of these, bytes that stand in no text (is_text())
   Port& port() { return port_; }
   const std::string& name() const { return port_.name(); }
 
@@ -53,27 +53,31 @@ class LinePort {
 
 constexpr int kAttempts = 6;  ///< at an answer that is not damaged
 
-/// Firmware facts from M115.
+/// What a firmware says of itself (M115).
 struct MarlinCapabilities {
-  std::string firmware;           ///< the text of FIRMWARE_NAME
-  bool emergency_parser = false;  ///< M112, M410 act ahead of the queue
-  bool klipper = false;           ///< never asks for a line again, has no M410 and no M114 R
+  std::string firmware;           ///< its name and version, the text behind FIRMWARE_NAME
+  bool emergency_parser = false;  ///< M112 and M410 act as soon as they arrive, ahead of the queue
+  bool klipper = false;           ///< Klipper's host: it asks for no line again, has no M410 and no M114 R
+  /// Whether M410 ends a move that has begun.
   bool quick_stop() const { return !klipper; }
 };
 
+/// One firmware at one port: sends it commands one at a time, and knows which of them have run. For one
+/// thread. Times are seconds of the port's clock.
 class MarlinLink {
  public:
+  /// Of the whole connection.
   struct Counters {
     std::uint64_t repeats = 0;   ///< lines sent again
     std::uint64_t timeouts = 0;  ///< answers that did not come in time
     std::uint64_t faults = 0;    ///< damaged lines reported by the firmware
   };
-  /// What a command brought back; times are those of the port's clock.
+  /// What the firmware said to one command, and when.
   struct Answer {
-    std::vector<Reply> replies;  ///< everything but ok, in order
-    double sent_s = 0;           ///< before the first copy of the line was written
-    double answered_s = 0;       ///< when its ok (or the proof that it ran) arrived
-    bool repeated = false;       ///< sent or asked for again: the times say little about when it ran
+    std::vector<Reply> replies;  ///< the lines before its ok, oldest first
+    double sent_s = 0;           ///< before its line was written for the first time
+    double answered_s = 0;       ///< when its ok arrived, or another answer that proves that it was taken
+    bool repeated = false;  ///< its line was sent or asked for again: sent_s and answered_s lie far apart
   };
 
   /// `port` must outlive the link.
@@ -81,7 +85,7 @@ class MarlinLink {
 
   /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, reads M115; waits for a
   /// Klipper that still starts. Throws PrinterSilent; WrongDevice when what comes is no such firmware's
-  /// answer (GRBL and RepRapFirmware are named); PrinterHalted.
+  /// answer, with what it said; PrinterHalted.
   void connect();
 
   /// Runs one command and returns when the firmware has acknowledged it. `deadline_s` 0: 2.5 s;
@@ -132,8 +136,6 @@ class MarlinLink {
   Exchange exchange_of(std::string_view code, double deadline_s);
   bool probe(double until);
   [[noreturn]] void nobody_answered();
-  [[noreturn]] void refuse(const std::string& firmware, const std::string& why) const;
-  void refuse_grbl(const std::string& line) const;
   void refuse_sensor() const;
   void read_capabilities();
   void await_klipper();

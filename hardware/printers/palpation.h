@@ -13,6 +13,7 @@
 
 namespace supertac {
 
+/// Of a run: down to the first pass, into contact, along the plate, out of contact, on to the next pass.
 enum class Phase { approach, onset, slide, release, reposition };
 const char* name_of(Phase phase);
 
@@ -76,6 +77,7 @@ struct PalpationObserver {
   std::function<void(bool)> contact = [](bool) {};
 };
 
+/// How a run ended.
 struct PalpationOutcome {
   enum class Finger { lifted, stopped, unknown };
   int passes_done = 0;
@@ -92,6 +94,7 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
 /// The same; throws OutsideLimits where a target or the way to it is not allowed.
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Limits& limits);
 
+/// One run of a plan with a printer.
 class Palpation {
  public:
   /// `printer` must outlive it.

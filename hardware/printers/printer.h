@@ -83,8 +83,11 @@ struct PositionSample {
   Point3 position;
 };
 
+/// One printer: moves its head within the limits, and knows where it is. For one thread. Lengths are mm,
+/// speeds mm/s, times s of the port's clock.
 class Printer {
  public:
+  /// How it is known where the head is: not at all, by the operator's word, by the firmware's homing.
   enum class Origin { unknown, confirmed, homed };
   struct Stop {
     bool confirmed = false;  ///< the head was shown to stand still

@@ -29,11 +29,10 @@ TEST(CollectProgram, MakesRecordingsAndLeavesTheHeadAtItsOrigin) {
 TEST(CollectProgram, SignalsInContactLiftTheFingerAndKeepWhatWasRecorded) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     CollectRun run;
-    RunningProcess process("supertac-collect", run.arguments());
-    ASSERT_TRUE(run.wait_for_contact(3, process)) << process.wait().error;
-    process.send(signal);
-    process.send(signal);  // a closed terminal says so twice; the finger comes first
-    const ProcessResult result = process.wait();
+    const ProcessResult result = run.collect_until_contact([signal](RunningProcess& process) {
+      process.send(signal);
+      process.send(signal);  // a closed terminal says so twice; the finger comes first
+    });
     expect_failure(result, 128 + signal, "");
     EXPECT_GE(run.head().z, kLiftedZ - 0.01) << "signal " << signal;
     EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal provenance.jsonl");
@@ -90,10 +89,7 @@ TEST(CollectProgram, ASignalWhileItConnectsEndsItWithoutATrace) {
 
 TEST(CollectProgram, AfterAKillTheJournalIsRecoveredAndTheOriginMustBeConfirmed) {
   CollectRun run;
-  RunningProcess process("supertac-collect", run.arguments());
-  ASSERT_TRUE(run.wait_for_contact(3, process)) << process.wait().error;
-  process.send(SIGKILL);
-  process.wait();
+  run.collect_until_contact([](RunningProcess& process) { process.send(SIGKILL); });
   run.wait_for_rest();
 
   // Whatever the folder: the mark is the printer's.
@@ -150,13 +146,11 @@ TEST(CollectProgram, ARunWithoutAFrameLeavesNoJournalInTheNextOnesWay) {
 // Where the finger is, what ended the run and what became of its frames, although no recording can be made.
 TEST(CollectProgram, ARunWhoseRecordingsCannotBeKeptSaysWhatItLeft) {
   CollectRun run;
-  std::vector<std::string> words = run.arguments();
-  std::erase(words, "--quiet");
-  RunningProcess process("supertac-collect", words);
-  ASSERT_TRUE(run.wait_for_contact(3, process)) << process.wait().error;
-  std::filesystem::create_directory(run.out() + "/provenance.jsonl");
-  process.send(SIGINT);
-  const ProcessResult result = process.wait();
+  const auto block_provenance = [&run](RunningProcess& process) {
+    std::filesystem::create_directory(run.out() + "/provenance.jsonl");
+    process.send(SIGINT);
+  };
+  const ProcessResult result = run.collect_until_contact(block_provenance, {"--quiet"});
   EXPECT_EQ(result.code, 130) << result.error;
   const std::size_t finger = result.error.find("incomplete after 0 passes; the finger was lifted\n");
   const std::size_t cause =
@@ -169,11 +163,10 @@ TEST(CollectProgram, ARunWhoseRecordingsCannotBeKeptSaysWhatItLeft) {
 
 TEST(CollectProgram, AJournalThatIsGoneIsNotSaidToBeKept) {
   CollectRun run;
-  RunningProcess process("supertac-collect", run.arguments());
-  ASSERT_TRUE(run.wait_for_contact(3, process)) << process.wait().error;
-  std::filesystem::remove(run.journal());
-  process.send(SIGINT);
-  const ProcessResult result = process.wait();
+  const ProcessResult result = run.collect_until_contact([&run](RunningProcess& process) {
+    std::filesystem::remove(run.journal());
+    process.send(SIGINT);
+  });
   EXPECT_TRUE(contains(result.error, "the journal " + run.journal() + " is gone"));
 }
 
@@ -184,12 +177,6 @@ TEST(CollectProgram, AFullDiskInContactLiftsTheFinger) {
   EXPECT_GE(run.head().z, kLiftedZ - 0.01);
   EXPECT_FALSE(contains(run.files(), ".tmp"));
 }
-
-struct Refusal {
-  const char* what;
-  std::vector<std::string> arguments;
-  std::vector<std::string> says;
-};
 
 TEST(CollectProgram, TheQuestionMayBeAnsweredWithY) {
   CollectRun run;
@@ -227,22 +214,16 @@ TEST(CollectProgram, APortThatCannotBeUsedIsOneClearLine) {
   CollectRun run;
   const TemporaryFolder folder;
   std::ofstream(folder / "file") << "text";
-  const std::vector<Refusal> refusals = {
-      {"no such port",
-       {"--printer", folder / "none"},
-       {folder / "none", "no such port", "supertac-check machine"}},
-      {"a file", {"--printer", folder / "file"}, {"expected a serial port", "supertac-check machine"}},
-      {"another terminal's kind of file",
-       {"--board", "/dev/null"},
-       {"expected a serial port", "supertac-check machine"}},
-      {"ports exchanged", {"--board", run.printer(), "--printer", run.board()}, {"exchange the two ports"}},
-      {"one port twice", {"--board", run.printer()}, {"already open"}},
-  };
-  for (const Refusal& refusal : refusals) {
-    SCOPED_TRACE(refusal.what);
-    const ProcessResult result = run.collect(refusal.arguments);
-    for (const std::string& part : refusal.says) expect_failure(result, 1, part);
-    EXPECT_EQ(run.files(), "");
+  using Words = std::vector<std::string>;
+  for (const auto& [arguments, says] : std::vector<std::pair<Words, Words>>{
+           {{"--printer", folder / "none"}, {folder / "none", "no such port", "supertac-check machine"}},
+           {{"--printer", folder / "file"}, {"expected a serial port", "supertac-check machine"}},
+           {{"--board", "/dev/null"}, {"expected a serial port", "supertac-check machine"}},
+           {{"--board", run.printer(), "--printer", run.board()}, {"exchange the two ports"}},
+           {{"--board", run.printer()}, {"already open"}}}) {
+    const ProcessResult result = run.collect(arguments);
+    for (const std::string& part : says) expect_failure(result, 1, part);
+    EXPECT_EQ(run.files(), "") << says[0];
   }
   EXPECT_LT(distance(run.head(), {99.7, 101.17, 131.81}), 1e-6);
   EXPECT_EQ(run.collect({"--speed", "50"}).code, 0) << "the next start, with the right ports, is not held up";

@@ -40,6 +40,22 @@ sockaddr_in at_port(int port) {
   return address;
 }
 
+/// Sends datagrams to a port of this computer.
+class UdpSender {
+ public:
+  explicit UdpSender(int port) : to_(at_port(port)) {}
+  ~UdpSender() { close(out_); }
+  UdpSender(const UdpSender&) = delete;
+  UdpSender& operator=(const UdpSender&) = delete;
+  void send(const std::string& bytes) const {
+    sendto(out_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to_), sizeof to_);
+  }
+
+ private:
+  int out_ = socket(AF_INET, SOCK_DGRAM, 0);
+  sockaddr_in to_;
+};
+
 int free_port(int type) {
   const int probe = socket(AF_INET, type, 0);
   sockaddr_in address = at_port(0);
@@ -155,15 +171,13 @@ TEST(SensorReader, LosesNothingOfAThousandFramesOf16x16OverUdp) {
   const Sensor sensor = mat(16, 16, 1000, R"({"kind":"binary","header":"AA55","type":"u16"})");
   const int port = free_port(SOCK_DGRAM);
   SensorReader reader(open_port("udp:127.0.0.1:" + std::to_string(port)), sensor);
-  const int out = socket(AF_INET, SOCK_DGRAM, 0);
-  const sockaddr_in to = at_port(port);
+  const UdpSender out(port);
   // The kernel keeps some 200 kB for a reader: one whose machine is busy elsewhere is waited for.
   constexpr std::uint64_t kUnderWay = 64;
   const std::jthread sender([&](const std::stop_token& over) {
     for (std::uint64_t n = 0; n < 2000; ++n) {
       while (!over.stop_requested() && n > reader.counters().decoder.frames + kUnderWay) usleep(1000);
-      const std::string frame = sent_frame(sensor, numbered(sensor, static_cast<int>(n)), 0);
-      sendto(out, frame.data(), frame.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+      out.send(sent_frame(sensor, numbered(sensor, static_cast<int>(n)), 0));
     }
   });
   const std::vector<ReadFrame> frames = all_of(reader, 2000);
@@ -175,22 +189,17 @@ TEST(SensorReader, ADatagramOfTextIsALine) {
   const Sensor sensor = mat(1, 3, 100, R"({"kind":"text"})");
   const int port = free_port(SOCK_DGRAM);
   SensorReader reader(open_port("udp::" + std::to_string(port), true), sensor);
-  const int out = socket(AF_INET, SOCK_DGRAM, 0);
-  const sockaddr_in to = at_port(port);
-  for (int n = 0; n < 20; ++n) sendto(out, "1,2,3", 5, 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+  const UdpSender out(port);
+  for (int n = 0; n < 20; ++n) out.send("1,2,3");
   EXPECT_EQ(all_of(reader, 20).size(), 20U);
-  close(out);
 }
 
 // A datagram of nothing is none, and does not prolong the wait.
 TEST(OpenPort, EmptyDatagramsAreNotReadBeyondTheDeadline) {
   const int port = free_port(SOCK_DGRAM);
   const OpenedPort opened = open_port("udp::" + std::to_string(port));
-  const int out = socket(AF_INET, SOCK_DGRAM, 0);
-  const sockaddr_in to = at_port(port);
-  for (const char* bytes : {"", "", "x"})
-    sendto(out, bytes, std::strlen(bytes), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
-  close(out);
+  const UdpSender out(port);
+  for (const char* bytes : {"", "", "x"}) out.send(bytes);
   std::array<std::byte, 16> buffer{};
   EXPECT_EQ(opened.port->read(buffer, 0).count, 0U);
   EXPECT_EQ(opened.port->read(buffer, opened.port->now() + 10).count, 1U);

@@ -17,13 +17,21 @@
 
 namespace supertac::serial_port_test {
 
-std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+/// A pseudo-terminal behind `path_`.
+class SerialPortTest : public testing::Test {
+ protected:
+  /// What the device sends.
+  void send(const std::string& text) {
+    ASSERT_EQ(write(terminal_.descriptor(), text.data(), text.size()), std::ssize(text));
+  }
+  TemporaryFolder folder_;
+  std::string path_ = folder_ / "port";
+  PseudoTerminal terminal_{path_};
+};
 
-TEST(SerialPort, TakesTheBoardsOddBaudRateAndNoModemLines) {
-  const TemporaryFolder folder;
-  const PseudoTerminal terminal(folder / "port");
-  const SerialPort port(folder / "port", {.baud = 7'372'800});  // a pty has no DTR: not an error
-  const int other = open(terminal.path().c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK);
+TEST_F(SerialPortTest, TakesTheBoardsOddBaudRateAndNoModemLines) {
+  const SerialPort port(path_, {.baud = 7'372'800});  // a pty has no DTR: not an error
+  const int other = open(terminal_.path().c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK);
   // Root may still look; everybody else is refused by TIOCEXCL.
   if (other >= 0) {
     EXPECT_EQ(terminal_baud(other), 7'372'800U);
@@ -31,15 +39,12 @@ TEST(SerialPort, TakesTheBoardsOddBaudRateAndNoModemLines) {
   }
 }
 
-TEST(SerialPort, SecondOpenerIsRefusedEvenAsRoot) {
-  const TemporaryFolder folder;
-  const PseudoTerminal terminal(folder / "port");
+TEST_F(SerialPortTest, SecondOpenerIsRefusedEvenAsRoot) {
   {
-    const SerialPort first(folder / "port");
-    EXPECT_ERROR(SerialPort second(folder / "port"), PortBusy,
-                 "already open, by another program (see `fuser ");
+    const SerialPort first(path_);
+    EXPECT_ERROR(SerialPort second(path_), PortBusy, "already open, by another program (see `fuser ");
   }
-  EXPECT_NO_THROW(SerialPort third(folder / "port"));
+  EXPECT_NO_THROW(SerialPort third(path_));
 }
 
 TEST(PortList, ALastingNameIsThatOfTheDevice) {
@@ -65,17 +70,15 @@ TEST(SerialPort, WhatCannotBeOpenedSaysWhy) {
 }
 
 // A user without rights on the port; root first becomes nobody.
-TEST(SerialPort, WithoutPermissionTheGroupIsNamed) {
-  const TemporaryFolder folder;
-  const PseudoTerminal terminal(folder / "port");
-  ASSERT_EQ(chmod(terminal.path().c_str(), 0), 0);
+TEST_F(SerialPortTest, WithoutPermissionTheGroupIsNamed) {
+  ASSERT_EQ(chmod(terminal_.path().c_str(), 0), 0);
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
     int code = 1;
     if (geteuid() == 0 && setuid(65534) != 0) _exit(2);
     try {
-      const SerialPort port(terminal.path());
+      const SerialPort port(terminal_.path());
     } catch (const PortPermission& error) {
       code = std::string(error.what()).find("dialout") != std::string::npos ? 0 : 3;
     }
@@ -86,32 +89,28 @@ TEST(SerialPort, WithoutPermissionTheGroupIsNamed) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
-TEST(SerialPort, WhatCameBeforeItWasOpenedIsNotTakenForNew) {
-  const TemporaryFolder folder;
-  const PseudoTerminal terminal(folder / "port");
-  SerialPort(folder / "port");  // a pseudo-terminal keeps what comes once somebody has opened it
-  ASSERT_EQ(write(terminal.descriptor(), "old", 3), 3);
-  SerialPort port(folder / "port");
-  ASSERT_EQ(write(terminal.descriptor(), "new", 3), 3);
+TEST_F(SerialPortTest, WhatCameBeforeItWasOpenedIsNotTakenForNew) {
+  SerialPort{path_};  // a pseudo-terminal keeps what comes once somebody has opened it
+  send("old");
+  SerialPort port(path_);
+  send("new");
   std::array<std::byte, 16> buffer{};
   ASSERT_EQ(port.read(buffer, port.now() + 1).count, 3U);
   EXPECT_EQ(buffer[0], std::byte{'n'});
 }
 
-TEST(SerialPort, TimeOutAndEndOfFileAreDifferent) {
-  const TemporaryFolder folder;
-  PseudoTerminal terminal(folder / "port");
-  SerialPort port(folder / "port");
+TEST_F(SerialPortTest, TimeOutAndEndOfFileAreDifferent) {
+  SerialPort port(path_);
   std::array<std::byte, 16> buffer{};
   EXPECT_EQ(port.read(buffer, port.now() + 0.02).count, 0U);
-  ASSERT_EQ(write(terminal.descriptor(), "last", 4), 4);
-  terminal.unplug();
+  send("last");
+  terminal_.unplug();
   EXPECT_THROW(
       {
         for (int i = 0; i < 3; ++i) (void)port.read(buffer, port.now() + 1);
       },
       PortUnplugged);
-  EXPECT_ERROR(port.write(bytes_of("x"), port.now() + 1), PortUnplugged,
+  EXPECT_ERROR(port.write(std::as_bytes(std::span("x")), port.now() + 1), PortUnplugged,
                "check the cable and start again, nothing is resumed");
 }
 
@@ -131,20 +130,16 @@ TEST(SerialPort, UnpluggingEndsTheWait) {
   }
 }
 
-TEST(SerialPort, AFullDeviceIsATimeOut) {
-  const TemporaryFolder folder;
-  const PseudoTerminal terminal(folder / "port");
-  SerialPort port(folder / "port");
+TEST_F(SerialPortTest, AFullDeviceIsATimeOut) {
+  SerialPort port(path_);
   const std::vector<std::byte> much(1 << 20);
   EXPECT_ERROR(port.write(much, port.now() + 0.05), PortTimeout,
                "the device took no bytes before the deadline (");
 }
 
 // Partial writes, EAGAIN and EINTR: a slow reader, and a signal every 200 us without SA_RESTART.
-TEST(SerialPort, OutputIsByteExactUnderAStormOfSignals) {
-  const TemporaryFolder folder;
-  const PseudoTerminal terminal(folder / "port");
-  SerialPort port(folder / "port");
+TEST_F(SerialPortTest, OutputIsByteExactUnderAStormOfSignals) {
+  SerialPort port(path_);
   std::vector<std::byte> sent(200'000);
   for (std::size_t i = 0; i < sent.size(); ++i) sent[i] = static_cast<std::byte>(i * 131 >> 3);
 
@@ -160,7 +155,7 @@ TEST(SerialPort, OutputIsByteExactUnderAStormOfSignals) {
     std::array<std::byte, 777> buffer{};
     const double until = monotonic_seconds() + 30;
     while (got.size() < sent.size() && monotonic_seconds() < until) {
-      const ssize_t count = read(terminal.descriptor(), buffer.data(), buffer.size());
+      const ssize_t count = read(terminal_.descriptor(), buffer.data(), buffer.size());
       if (count > 0) got.insert(got.end(), buffer.begin(), buffer.begin() + count);
       if (count < 0) std::this_thread::sleep_for(std::chrono::microseconds(300));
     }
