@@ -11,13 +11,6 @@ namespace {
 // Seconds: for a board that boots, and between two M110 N0 meanwhile; in which Klipper finds its boards.
 constexpr double kConnectDeadline = 20, kProbeInterval = 1, kKlipperStarts = 60;
 
-// Numbers, or an object of JSON: what Marlin says begins with a word, or is but one.
-bool is_of_a_sensor(std::string_view line) {
-  return line.starts_with('{') ||
-         (line.find_first_of("0123456789") != std::string_view::npos &&
-          line.find_first_not_of("0123456789+-.eE,;:[]{} \t") == std::string_view::npos);
-}
-
 }  // namespace
 
 void MarlinLink::connect() {
@@ -66,13 +59,12 @@ void MarlinLink::nobody_answered() {
   throw PrinterSilent(expected + "no" + within + "check that the printer is on and the port is right");
 }
 
-void MarlinLink::refuse_sensor() const {
+void MarlinLink::refuse_board() const {
   constexpr std::size_t kFewFrames = 3 * rig::kFrameBytes;
-  const bool no_text = 3 * lines_.no_text() > lines_.bytes(), numbers = 2 * numbers_ > heard_;
-  if (lines_.bytes() <= kFewFrames || !(no_text || numbers)) return;
-  throw WrongDevice("port " + lines_.name() + ": expected a Marlin printer, found " +
-                    (no_text ? "no text, as from a tactile board" : "numbers, as from a sensor") +
-                    (numbers ? " (" + in_quotes(complaint_) + ")" : "") + "; exchange the two ports");
+  if (lines_.bytes() > kFewFrames && 3 * lines_.no_text() > lines_.bytes())
+    throw WrongDevice("port " + lines_.name() +
+                      ": expected a Marlin printer, found no text, as from a tactile board; exchange the two "
+                      "ports");
 }
 
 bool MarlinLink::probe(double until) {
@@ -83,12 +75,11 @@ bool MarlinLink::probe(double until) {
     if (reply.kind == ReplyKind::fatal) check_alarm(reply);
     if (reply.kind == ReplyKind::other || reply.kind == ReplyKind::error || reply.kind == ReplyKind::paused)
       complaint_ = line;
-    ++heard_, numbers_ += is_of_a_sensor(line) ? 1 : 0;
     if (reply.kind != ReplyKind::ok) continue;
     settle();
     return true;
   }
-  refuse_sensor();
+  refuse_board();
   return false;
 }
 

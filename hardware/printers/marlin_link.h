@@ -136,7 +136,7 @@ class MarlinLink {
   Exchange exchange_of(std::string_view code, double deadline_s);
   bool probe(double until);
   [[noreturn]] void nobody_answered();
-  void refuse_sensor() const;
+  void refuse_board() const;
   void read_capabilities();
   void await_klipper();
   /// Sends the exchange's current line again.
@@ -160,10 +160,9 @@ class MarlinLink {
   LinePort lines_;
   MarlinCapabilities capabilities_;
   Counters counters_;
-  std::string complaint_;                // what was said since an ok; the cause of a halt stands before it
-  std::deque<std::string> kept_;         // lines number_ - kept_.size() + 1 ... number_
-  std::int64_t number_ = 0;              // of the newest line
-  std::size_t heard_ = 0, numbers_ = 0;  // lines until it answered; those like a sensor's
+  std::string complaint_;         // what was said since an ok; the cause of a halt stands before it
+  std::deque<std::string> kept_;  // lines number_ - kept_.size() + 1 ... number_
+  std::int64_t number_ = 0;       // of the newest line
   double give_up_s_ = std::numeric_limits<double>::infinity();
   bool connected_ = false;
   bool halted_ = false;

@@ -206,15 +206,8 @@ std::string PlainRig::answer_to(const std::string& command) {
   if (code == "G0" || code == "G1") {
     move(command);
   } else if (code == "G92") {
-    const Point3 at = motion_.target(), named = place_in(command, false);
+    const Point3 at = motion_.target(), named = place_in(command);
     zero_ = {at.x - named.x, at.y - named.y, at.z - named.z};
-  } else if (code == "G20" || code == "G21") {
-    unit_mm_ = code == "G20" ? 25.4 : 1;
-  } else if (code == "G90" || code == "G91") {
-    relative_ = code == "G91";
-  } else if (code == "M220") {
-    if (!parameter(command, "S")) return "FR:" + format(speed_percent_) + "%\n";
-    speed_percent_ = *parameter(command, "S");
   } else if (code == "M114") {
     const Point3 p = command.ends_with("R") ? motion_.at(now_s_) : motion_.target();
     return "X:" + format(p.x - zero_.x, 2) + " Y:" + format(p.y - zero_.y, 2) +
@@ -234,20 +227,16 @@ std::string PlainRig::answer_to(const std::string& command) {
 }
 
 // Where it leads to, or is to be called, in the coordinates of commands.
-Point3 PlainRig::place_in(const std::string& command, bool relative) const {
+Point3 PlainRig::place_in(const std::string& command) const {
   const Point3 at = motion_.target();
-  const auto axis = [&](const char* name, double from) {
-    const auto value = parameter(command, name);
-    return value ? unit_mm_ * *value + (relative ? from : 0) : from;
-  };
-  return {axis("X", at.x - zero_.x), axis("Y", at.y - zero_.y), axis("Z", at.z - zero_.z)};
+  return {parameter(command, "X").value_or(at.x - zero_.x), parameter(command, "Y").value_or(at.y - zero_.y),
+          parameter(command, "Z").value_or(at.z - zero_.z)};
 }
 
 void PlainRig::move(const std::string& command) {
-  if (const auto feed = parameter(command, "F")) feed_mm_s_ = unit_mm_ * *feed / 60;
-  const Point3 to = place_in(command, relative_);
-  motion_.move_to({to.x + zero_.x, to.y + zero_.y, to.z + zero_.z}, feed_mm_s_ * speed_percent_ / 100,
-                  now_s_);
+  if (const auto feed = parameter(command, "F")) feed_mm_s_ = *feed / 60;
+  const Point3 to = place_in(command);
+  motion_.move_to({to.x + zero_.x, to.y + zero_.y, to.z + zero_.z}, feed_mm_s_, now_s_);
 }
 
 std::vector<std::byte> PlainRig::from_printer() {
@@ -311,7 +300,6 @@ void PtyRig::run() {
 
 void PtyRig::serve_printer() {
   rig_->advance(now(speedup_));
-  if (rig_->printer_unplugged()) printer_.unplug();
   if (printer_.descriptor() < 0) return;
   std::array<std::byte, 1024> buffer{};
   const ssize_t count = ::read(printer_.descriptor(), buffer.data(), buffer.size());

@@ -63,7 +63,6 @@ class RigAtPorts {
   /// Bytes from the host to the printer, arriving now, and those that left the printer since.
   virtual void to_printer(std::span<const std::byte> bytes) = 0;
   virtual std::vector<std::byte> from_printer() = 0;
-  virtual bool printer_unplugged() const { return false; }
 
   /// Takes the board's bytes at time t; returns how many of them the host takes.
   std::function<std::size_t(std::span<const std::byte>, double t)> board_sink;
@@ -92,7 +91,7 @@ struct NumberedLines {
 };
 
 /// The board at its nominal rate. A running Marlin with an emergency parser, the head at rig::kMounted, that
-/// knows G0, G1, G20, G21, G28, G90, G91, G92, M105, M108, M110, M112, M114 (R), M115, M220, M400 and M410.
+/// knows G0, G1, G28, G92, M105, M108, M110, M112, M114 (R), M115, M400 and M410, in mm and absolute.
 class PlainRig : public RigAtPorts {
  public:
   PlainRig(FingerSignals signals, double t);
@@ -105,7 +104,7 @@ class PlainRig : public RigAtPorts {
   void take_line(const std::string& line);
   void run_waiting();
   std::string answer_to(const std::string& command);
-  Point3 place_in(const std::string& command, bool relative) const;
+  Point3 place_in(const std::string& command) const;
   void move(const std::string& command);
   void send_frame();
   double next_frame() const { return start_s_ + static_cast<double>(frames_ + 1) * rig::kFramePeriodS; }
@@ -114,12 +113,12 @@ class PlainRig : public RigAtPorts {
   MotionQueue motion_;
   double start_s_, now_s_, held_until_s_ = -1;  // by the command that runs
   Point3 zero_;                                 // logical = physical - zero
-  double feed_mm_s_ = rig::kSlideMmS, unit_mm_ = 1, speed_percent_ = 100;
+  double feed_mm_s_ = rig::kSlideMmS;
   NumberedLines lines_;
   std::deque<std::string> waiting_;  // commands
   std::string partial_, output_;
   std::uint64_t frames_ = 0;
-  bool held_ = false, halted_ = false, relative_ = false;
+  bool held_ = false, halted_ = false;
 };
 
 /// The master side of a pseudo-terminal, its slave side linked at `link`.

@@ -10,7 +10,6 @@
 #include "hardware/ports/errors.h"
 #include "io/numbers/numbers.h"
 #include "tests/hardware/numbered_board.h"
-#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {

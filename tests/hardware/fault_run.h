@@ -6,8 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "hardware/collection/palpation_recorder.h"
-#include "tests/hardware/simulated_rig.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 

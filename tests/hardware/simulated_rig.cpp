@@ -1,9 +1,8 @@
-#include "tests/hardware/simulated_rig.h"
-
 #include <algorithm>
 #include <chrono>
 
 #include "hardware/ports/errors.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {

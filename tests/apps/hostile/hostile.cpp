@@ -3,9 +3,9 @@
 // asan. hostile signals N SEED: N simulations, imports and trainings ended by a signal at a random moment.
 // hostile files N SEED: N files that are valid and lie. hostile devices N SEED: N collections, in simulated
 // time, with printers that lie, that another job left otherwise, that are stopped at their display, boards
-// that send in bursts, hosts that stall, and pages whose tabs sleep. One table of counts on stdout; exit 1
-// when anything was found. Run it as an ordinary user or as root: as root the programs run as nobody, since
-// evil values are also names of outputs.
+// that send in bursts, and hosts that stall. One table of counts on stdout; exit 1 when anything was found.
+// Run it as an ordinary user or as root: as root the programs run as nobody, since evil values are also names
+// of outputs.
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>

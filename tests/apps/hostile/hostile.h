@@ -37,9 +37,8 @@ Counts mutants_of_readers(const std::string& folder, std::uint64_t n, std::uint6
 /// Counts "lying files", and as judge_reading().
 Counts lying_files(const std::string& folder, std::uint64_t n, std::uint64_t seed);
 
-/// Collections in simulated time. Counts "collections", "complete", "typed errors" and "broken promises":
-/// those of run_faulty_collection(), that the end comes within an hour of the rig's, and that Stop on a page
-/// is heard once, within 2 s, whatever other tabs do.
+/// Collections in simulated time with printers that lie. Counts "collections", "complete", "typed errors" and
+/// "broken promises", which are those of run_faulty_collection().
 Counts lying_devices(std::uint64_t n, std::uint64_t seed);
 
 }  // namespace supertac

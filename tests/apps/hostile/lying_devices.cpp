@@ -1,17 +1,11 @@
 #include <algorithm>
 #include <array>
-#include <atomic>
-#include <ctime>
 #include <iostream>
 #include <memory>
 #include <vector>
 
-#include "apps/web/web_server.h"
-#include "io/numbers/clock.h"
 #include "tests/apps/hostile/hostile.h"
-#include "tests/apps/web/http_client.h"
 #include "tests/hardware/fault_run.h"
-#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {
@@ -98,39 +92,6 @@ class LyingPort : public WrappedPort {
   double said_s_ = 0;
 };
 
-/// Stop on a page among up to 300 tabs that listen, sleep, break off, or say half of something. Returns what
-/// was wrong.
-std::string stop_among_tabs(std::uint64_t seed) {
-  Dice dice(seed, 78);
-  std::atomic<int> stops{0};
-  const auto says = [](const char* text) { return [text] { return std::string(text); }; };
-  WebServer server({.port = 0},
-                   {.page = "page",
-                    .hello = says("{\"plate\":\"6_Ridges\"}"),
-                    .news = says("{\"pass\":1}"),
-                    .actions = {{"stop", [&stops] { return ++stops, std::string("stopped"); }}}});
-  const int port = std::stoi(server.url().substr(server.url().rfind(':') + 1));
-  const std::string events = "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n";
-  const std::string post =
-      "POST /stop HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\nOrigin: http://localhost\r\nX-Token: ";
-  const std::string said[] = {events, events.substr(0, 20), "", post + "another\r\n\r\n", post};
-  std::vector<std::unique_ptr<HttpClient>> tabs;
-  for (std::uint32_t left = 1 + dice.below(300); left > 0; --left) {
-    tabs.push_back(std::make_unique<HttpClient>(port, dice.hit(0.5) ? 2048 : 0));
-    tabs.back()->send(said[dice.below(std::size(said))]);
-    if (dice.hit(0.2)) tabs.erase(tabs.begin() + dice.below(static_cast<std::uint32_t>(tabs.size())));
-  }
-  HttpClient page(port);
-  page.send(events);
-  const std::string token = event_after(page.receive("6_Ridges\"}\n\n"), "event: hello\ndata: ").at("token");
-  const double begin = seconds_of(CLOCK_MONOTONIC);
-  const int status = status_of(port, post + token + "\r\n\r\n");
-  const double took = seconds_of(CLOCK_MONOTONIC) - begin;
-  if (status == 200 && stops == 1 && took < 2) return {};
-  return "Stop among " + std::to_string(tabs.size()) + " tabs: status " + std::to_string(status) +
-         ", heard " + std::to_string(stops) + " times, after " + std::to_string(took) + " s";
-}
-
 }  // namespace
 
 Counts lying_devices(std::uint64_t n, std::uint64_t seed) {
@@ -144,7 +105,6 @@ Counts lying_devices(std::uint64_t n, std::uint64_t seed) {
     };
     FaultVerdict verdict = run_faulty_collection(rig, drawn.plan, drawn.origin, lie);
     ++counts[verdict.complete ? "complete" : "typed errors"];
-    if (const std::string wrong = stop_among_tabs(seed + i); !wrong.empty()) verdict.broken = wrong;
     // Nobody can know where a finger is whose printer says nothing true: then the user must be told.
     if (verdict.broken.find("switch the printer off") != std::string::npos) verdict.broken.clear();
     // A liar says itself what it had been set to.

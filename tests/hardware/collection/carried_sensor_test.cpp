@@ -6,7 +6,6 @@
 #include "hardware/collection/palpation_recorder.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
-#include "tests/fuzz/journal_properties.h"
 #include "tests/hardware/fake_sensor.h"
 #include "tests/hardware/numbered_board.h"
 #include "tests/hardware/rig_support.h"
@@ -212,24 +211,6 @@ TEST(CarriedSensor, AReplayThatGoesWrongForDamageSaysSo) {
   EXPECT_ERROR(damaged.read(buffer, 2), JournalError, "damaged: record 0 does not follow");
   EXPECT_EQ(damaged.now(), 1);
   EXPECT_ERROR(damaged.write(buffer, 2), JournalError, says);
-}
-
-// Whatever its bytes say, sums put right: passes, or a JournalError.
-TEST(CarriedSensor, NoBytesOfAJournalDoHarm) {
-  CarriedSensor run(mat(true));
-  run.settings.bed.plan.slide = 2;
-  (void)run.record();
-  const std::vector<std::byte> whole = read_file(run.settings.journal, 1 << 30);
-  for (int seed = 1; seed <= mutations(60); ++seed) {
-    const RandomStream draw(static_cast<std::uint64_t>(seed), 5);
-    std::vector<std::byte> bytes = whole;
-    for (std::uint64_t n = 0; n < 4; ++n) {  // most of them in the header, which stands there twice
-      const std::size_t within = draw.uniform(3 * n) < 0.75 ? 600 : bytes.size();
-      bytes[static_cast<std::size_t>(draw.uniform(3 * n + 1) * static_cast<double>(within))] ^=
-          static_cast<std::byte>(1 + draw.bits(3 * n + 2) % 255);
-    }
-    EXPECT_NO_THROW(check_journal(bytes)) << "seed " << seed;
-  }
 }
 
 // A line of two bytes, a frame of 4,096 places of which one has a taxel.

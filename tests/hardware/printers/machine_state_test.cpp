@@ -2,7 +2,6 @@
 #include "hardware/printers/printer.h"
 
 #include "tests/hardware/fault_run.h"
-#include "tests/hardware/rig_support.h"
 #include "tests/support/test.h"
 
 namespace supertac::machine_state_test {

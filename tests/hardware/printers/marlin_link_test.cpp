@@ -6,6 +6,49 @@
 
 namespace supertac::marlin_link_test {
 
+/// Says `text` over and over, `most` bytes at once and every `every_s` seconds.
+class Talker : public FakePort {
+ public:
+  explicit Talker(const std::string& text, std::size_t most = 100, double every_s = 0.001)
+      : most_(most), every_s_(every_s) {
+    name_ = text;
+  }
+  Received read(std::span<std::byte> buffer, double) override {
+    for (std::size_t i = 0; i < most_; ++i) said_ += name_[at_++ % name_.size()];
+    now_ += every_s_;
+    return hand_on(buffer);
+  }
+
+ private:
+  std::size_t most_, at_ = 0;
+  double every_s_;
+};
+
+TEST(LinePort, EndsInTimeWhateverComesForEver) {
+  for (Talker talker : {Talker("x"), Talker("x", 1, 0.01), Talker("ok\n"), Talker("ok\n", 1, 0.01)}) {
+    LinePort lines(talker);
+    std::string line;
+    int read = 0;
+    while (read < 100'000 && lines.read(1.0, line)) ++read;
+    EXPECT_NEAR(talker.now(), 1, 0.02) << read << " lines of " << talker.name();
+    EXPECT_EQ(read > 0, talker.name() != "x");
+    EXPECT_EQ(lines.no_text(), 0U);
+  }
+}
+
+TEST(LinePort, GivesLinesWithoutBreaksBlanksAndEmptyOnes) {
+  Talker talker("ok \r\n\n  \necho:busy\x01\n");
+  LinePort lines(talker);
+  std::string line;
+  ASSERT_TRUE(lines.read(1.0, line));
+  EXPECT_EQ(line, "ok");
+  ASSERT_TRUE(lines.take(line));
+  EXPECT_EQ(line, "echo:busy\x01");
+  EXPECT_DOUBLE_EQ(lines.arrival_s(), 0.001);
+  EXPECT_EQ(lines.bytes(), 100U);
+  EXPECT_GT(lines.no_text(), 0U);
+}
+
 constexpr std::int64_t kConnecting = 1;  // lines that connecting sends: M115
 
 /// A connected link over a simulated printer.
@@ -226,8 +269,9 @@ TEST(MarlinLink, AnswersWithoutProgressEnd) {
       EXPECT_LT(talker.now(), begin + 3.1);
     }
   }
-  for (const auto& [answer, always, says] :
-       {std::tuple("", "hello\n", "it said 'hello'"), {"error:20\n", "", "it said 'error:20'"}}) {
+  for (const auto& [answer, always, says] : {std::tuple("", "hello\n", "it said 'hello'"),
+                                             {"error:20\n", "", "it said 'error:20'"},
+                                             {"", "812,-70,4.5e2, 99\r\n", "it said '812,-70,4.5e2, 99'"}}) {
     ScriptedPrinter stranger([&, &answer = answer](const std::string&) { return answer; }, always);
     MarlinLink link(stranger);
     EXPECT_ERROR(link.connect(), WrongDevice, says);
@@ -248,20 +292,6 @@ TEST(MarlinLink, AnEndThatIsNeverAcknowledgedIsNotAwaitedForEver) {
   EXPECT_ERROR(link.command("G28", 10), PrinterSilent,
                "expected an ok to M400 behind 'G28', found none of 6");
   EXPECT_LT(port.now(), 100);
-}
-
-TEST(MarlinLink, ASensorAtThePrintersPortIsRecognised) {
-  const std::string wide = std::string(9000, '7') + '\n';  // longer than a line of Marlin's may be
-  for (const std::string& line : {std::string("812,-70,4.5e2, 99\r\n"), std::string("[[1,2],[3,4]]\n"),
-                                  std::string("{\"t\":12,\"taxels\":[1,2]}\n"), wide}) {
-    ScriptedPrinter sensor([](const std::string&) { return ""; }, line);
-    MarlinLink link(sensor);
-    EXPECT_ERROR(link.connect(), WrongDevice, "found numbers, as from a sensor ('");
-    EXPECT_LT(sensor.now(), 6) << line;
-  }
-  ScriptedPrinter printer(connects, "T:25.0 /0.0 @:0\n12\n");
-  MarlinLink link(printer);
-  EXPECT_ERROR(link.connect(), PrinterSilent, "no answer") << "half of its lines are words";
 }
 
 TEST(MarlinLink, ARunHasABoundOfItsOwn) {

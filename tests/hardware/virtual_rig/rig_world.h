@@ -1,5 +1,5 @@
 // A rig that misbehaves by seed: printer and board in one world, the board feeling what is under the
-// printer's head. FaultyPtyRig drives it in (sped-up) real time, simulated_rig.h in simulated time.
+// printer's head. FaultyPtyRig drives it in (sped-up) real time, SimulatedRig in simulated time.
 #pragma once
 
 #include <cstdint>
@@ -74,7 +74,6 @@ class RigWorld : public RigAtPorts {
   double next_event() const override;
   void to_printer(std::span<const std::byte> bytes) override;
   std::vector<std::byte> from_printer() override;
-  bool printer_unplugged() const override { return printer_.unplugged(); }
 
   double now() const { return now_; }
   VirtualPrinter& printer() { return printer_; }
