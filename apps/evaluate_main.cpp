@@ -7,7 +7,6 @@
 #include "apps/common/running/progress.h"
 #include "apps/evaluate/exports.h"
 #include "apps/evaluate/map_scores.h"
-#include "apps/evaluate/score_tables.h"
 #include "apps/evaluate/scoring.h"
 #include "data/recordings/recording.h"
 #include "data/windows/signal_remarks.h"

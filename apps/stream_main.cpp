@@ -53,9 +53,8 @@ std::unique_ptr<SensorSource> open_source(const Arguments& a, double speedup) {
 
 /// A pseudo-terminal has a rig behind it that is none.
 std::string badge_of(const Arguments& a) {
-  if (a.given("replay")) return "replay";
-  if (a.given("recording")) return "recording";
-  if (a.given("sensor")) return "sensor";
+  for (const char* name : {"replay", "recording", "sensor"})
+    if (a.given(name)) return name;
   std::error_code error;
   const std::string device = std::filesystem::canonical(a.text("board"), error).string();
   return device.starts_with("/dev/pts/") ? "virtual rig" : "board";

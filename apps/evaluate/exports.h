@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "apps/common/output/output_folder.h"
-#include "apps/evaluate/score_tables.h"
+#include "apps/evaluate/scoring.h"
 #include "data/windows/windows.h"
 #include "models/inference/compiled/compiled_model.h"
 #include "models/inference/interval.h"

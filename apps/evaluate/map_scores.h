@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "apps/evaluate/score_tables.h"
 #include "apps/evaluate/scoring.h"
 #include "data/map/elements.h"
 #include "data/map/map_file.h"

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <omp.h>
 #include <poll.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -11,7 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
-#include <mutex>
+#include <latch>
 #include <new>
 #include <system_error>
 #include <thread>
@@ -41,31 +40,18 @@ int fail(const Program& program, std::string message, int code) {
   return code;
 }
 
-// With less, a thread ends by a segmentation fault.
-void check_stack() {
-  constexpr rlim_t kLeast = 1 << 20;
-  rlimit stack{};
-  if (::getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= kLeast) return;
-  throw std::runtime_error("the stack may hold " + std::to_string(stack.rlim_cur >> 10) + " kB, expected " +
-                           std::to_string(kLeast >> 10) + "; raise the limit with ulimit -s 8192");
-}
-
 // OpenMP would end the program, with a line of its own, where it cannot start its threads.
 void check_threads(int count) {
-  std::vector<std::thread> threads;
-  std::mutex wait;
   std::string problem;
-  {
-    const std::lock_guard all_at_once(wait);
-    try {
-      threads.reserve(static_cast<std::size_t>(count));
-      while (static_cast<int>(threads.size()) + 1 < count)
-        threads.emplace_back([&wait] { const std::lock_guard until_all_are_there(wait); });
-    } catch (const std::system_error& error) {
-      problem = error.code().message();
-    }
+  std::latch all_are_there(1);
+  std::vector<std::jthread> threads;
+  threads.reserve(static_cast<std::size_t>(count));
+  try {
+    while (std::ssize(threads) + 1 < count) threads.emplace_back([&] { all_are_there.wait(); });
+  } catch (const std::system_error& error) {
+    problem = error.code().message();
   }
-  for (std::thread& thread : threads) thread.join();
+  all_are_there.count_down();
   if (problem.empty()) return;
   throw std::runtime_error(
       "cannot start " + std::to_string(count) + " threads: " + problem + " after " +
@@ -145,7 +131,6 @@ void open_standard_descriptors() {
 }
 
 int run(const Program& program, Arguments& arguments) {
-  check_stack();
   check_threads(arguments.threads());
   omp_set_num_threads(arguments.threads());
   catch_signals();

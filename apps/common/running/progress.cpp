@@ -1,6 +1,5 @@
 #include "apps/common/running/progress.h"
 
-#include <fcntl.h>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -31,17 +30,9 @@ bool drawable_terminal() {
   return isatty(STDERR_FILENO) == 1 && terminal != nullptr && std::string_view(terminal) != "dumb";
 }
 
-// Opened anew: O_NONBLOCK on stderr itself would change it for the shell and everybody else who shares it.
-// Where that is refused (another user's terminal, no /proc) it is stderr, byte by byte while it takes them.
-TerminalLine::TerminalLine()
-    : terminal_(::open("/proc/self/fd/2", O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)) {
-  if (terminal_ < 0) terminal_ = STDERR_FILENO;
-}
-
 TerminalLine::~TerminalLine() {
   left_ += "\r" + std::string(width_, ' ') + "\r";
   (void)send_left();
-  if (terminal_ != STDERR_FILENO) ::close(terminal_);
 }
 
 // A terminal that takes nothing (Ctrl-S, a stuck connection) is left alone, with what it has not taken.
@@ -57,16 +48,17 @@ void TerminalLine::show(std::string line) {
   (void)send_left();
 }
 
+// Byte by byte while it takes them: O_NONBLOCK would change it for the shell and everybody else who shares
+// it.
 bool TerminalLine::send_left() {
-  const bool shared = terminal_ == STDERR_FILENO;
   while (!left_.empty()) {
-    pollfd takes{terminal_, POLLOUT, 0};
-    if (shared && ::poll(&takes, 1, 0) != 1) return false;
-    const ssize_t count = ::write(terminal_, left_.data(), shared ? 1 : left_.size());
+    pollfd takes{STDERR_FILENO, POLLOUT, 0};
+    if (::poll(&takes, 1, 0) != 1) return false;
+    const ssize_t count = ::write(STDERR_FILENO, left_.data(), 1);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0 && errno != EAGAIN) left_.clear();  // the terminal is gone
     if (count <= 0) return false;
-    left_.erase(0, static_cast<std::size_t>(count));
+    left_.erase(0, 1);
   }
   return true;
 }

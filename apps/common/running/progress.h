@@ -19,7 +19,7 @@ bool drawable_terminal();
 /// It needs no colour and no escape codes, and a terminal that is slow or not read holds up nobody.
 class TerminalLine {
  public:
-  TerminalLine();
+  TerminalLine() = default;
   ~TerminalLine();
   TerminalLine(const TerminalLine&) = delete;
   TerminalLine& operator=(const TerminalLine&) = delete;
@@ -29,7 +29,6 @@ class TerminalLine {
   /// False when the terminal has not taken everything yet.
   bool send_left();
 
-  int terminal_;
   std::string left_;       // not yet taken
   std::size_t width_ = 0;  // of what is drawn
 };

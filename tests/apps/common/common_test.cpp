@@ -100,9 +100,9 @@ TEST(Progress, LineTellsShareRateAndTimeLeft) {
             "x  [##........]  25 %  epoch 1/4  0:30 left");
 }
 
-TEST(TerminalLine, IsShownWhereStderrCannotBeOpenedAnewAndWaitsForNobody) {
+TEST(TerminalLine, IsShownAndWaitsForNobody) {
   int ends[2];
-  ASSERT_EQ(socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);  // no socket can be opened by name
+  ASSERT_EQ(socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);
   const int before = dup(STDERR_FILENO);
   dup2(ends[0], STDERR_FILENO);
   {
