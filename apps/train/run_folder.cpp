@@ -29,33 +29,20 @@ std::string csv(const LogLine& line) {
   return out + "\n";
 }
 
-// A damaged line (the last one of a killed run) is left out.
-std::optional<LogLine> parse(const std::string& text) {
-  std::vector<std::optional<double>> v;
-  for (const std::string& field : comma_list(text + ",")) v.push_back(parse_double(field));
-  if (v.size() != 11) return std::nullopt;
-  for (std::size_t i = 0; i < 9; ++i)
-    if (!v[i]) return std::nullopt;
-  return LogLine{{*v[2], *v[3], *v[4], *v[5], *v[6]},
-                 *v[0],
-                 static_cast<std::int64_t>(*v[1]),
-                 *v[7],
-                 *v[8],
-                 v[9],
-                 v[10]};
-}
-
-std::vector<LogLine> read_log(const std::string& path, std::int64_t last_step) {
-  std::vector<LogLine> lines;
-  if (!std::filesystem::exists(path)) return lines;
-  std::stringstream in(read_text_file(path, kMaxLogBytes));
-  std::string text;
-  std::getline(in, text);  // the header
-  while (std::getline(in, text)) {
-    const std::optional<LogLine> line = parse(text);
-    if (line && line->step <= last_step) lines.push_back(*line);
+// The log up to a step. A damaged line (the last one of a killed run) is left out.
+std::string read_log(const std::string& path, std::int64_t last_step) {
+  constexpr std::size_t kColumns = 11;
+  std::string log = kHeader;
+  if (!std::filesystem::exists(path)) return log;
+  std::istringstream in(read_text_file(path, kMaxLogBytes));
+  std::string line;
+  std::getline(in, line);  // the header
+  while (std::getline(in, line)) {
+    const std::vector<std::string> fields = comma_list(line + ",");
+    const auto step = fields.size() == kColumns ? parse_int(fields[1]) : std::nullopt;
+    if (step && *step <= last_step) log += line + "\n";
   }
-  return lines;
+  return log;
 }
 
 }  // namespace
@@ -81,10 +68,13 @@ RunFolder::RunFolder(const std::string& model_file, bool force, std::optional<st
   std::filesystem::create_directories(path_, error);
   if (error) throw FileError(path_, "cannot create the folder: " + error.message());
   lock_ = std::make_unique<FolderLock>(path_);
-  if (resumed_step) lines_ = read_log(path_ + "/log.csv", *resumed_step);
-  std::string text = kHeader;
-  for (const LogLine& line : lines_) text += csv(line);
-  write_file(path_ + "/log.csv", text);
+  log_ = resumed_step ? read_log(path_ + "/log.csv", *resumed_step) : kHeader;
+  write_file(path_ + "/log.csv", log_);
+}
+
+double RunFolder::seconds() const {
+  const std::size_t last_line = log_.rfind('\n', log_.size() - 2) + 1;
+  return parse_double(log_.substr(last_line, log_.find(',', last_line) - last_line)).value_or(0);
 }
 
 void RunFolder::write_settings(const nlohmann::ordered_json& settings) {
@@ -92,7 +82,7 @@ void RunFolder::write_settings(const nlohmann::ordered_json& settings) {
 }
 
 bool RunFolder::log(const LogLine& line) {
-  lines_.push_back(line);
+  log_ += csv(line);
   if (log_broken_) return true;
   std::ofstream out(path_ + "/log.csv", std::ios::app);
   out << csv(line) << std::flush;
@@ -101,9 +91,7 @@ bool RunFolder::log(const LogLine& line) {
 }
 
 void RunFolder::write_report() const {
-  std::string log = kHeader;
-  for (const LogLine& line : lines_) log += csv(line);
-  write_file(path_ + "/report.html", result_page({{"title", "SuperTac training"}, {"log", log}}));
+  write_file(path_ + "/report.html", result_page({{"title", "SuperTac training"}, {"log", log_}}));
 }
 
 }  // namespace supertac

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "io/files/file.h"
 #include "models/training/train.h"
@@ -21,7 +20,7 @@ class RunFolder {
   std::string checkpoint_path() const { return path_ + "/last.safetensors"; }
   const std::string& path() const { return path_; }
   /// Seconds on the clock of the log at its last line; 0 when there is none.
-  double seconds() const { return lines_.empty() ? 0 : lines_.back().time_s; }
+  double seconds() const;
 
   void write_settings(const nlohmann::ordered_json& settings);
   /// Appends and flushes. When the disk refuses, returns false, once; later lines are then kept in memory
@@ -34,7 +33,7 @@ class RunFolder {
  private:
   std::string path_;
   std::unique_ptr<FolderLock> lock_;
-  std::vector<LogLine> lines_;
+  std::string log_;
   bool log_broken_ = false;
 };
 
