@@ -137,24 +137,6 @@ std::string Arguments::help() const {
   return text + (positionals_.empty() ? "" : "\n");
 }
 
-/// cxxopts would name an unknown option without a hint.
-void Arguments::check_names(int argc, const char* const* argv) const {
-  std::vector<std::string> known;
-  for (const auto& [name, option] : options_) {
-    if (!option.is_positional) known.push_back(name);
-  }
-  for (int i = 1; i < argc; ++i) {
-    const std::string_view word = argv[i];
-    if (word == "--") return;
-    if (!word.starts_with("--")) continue;
-    const std::string name(word.substr(2, word.find('=') - 2));
-    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-    const std::string hint = nearest_name(name, known);
-    throw UsageError("unknown option " + in_quotes("--" + name) +
-                     (hint.empty() ? "" : "; did you mean '--" + hint + "'?"));
-  }
-}
-
 /// The command line with the values of options that stand alone.
 std::vector<std::string> Arguments::complete_words(int argc, const char* const* argv) const {
   std::vector<std::string> words;
@@ -171,13 +153,13 @@ std::vector<std::string> Arguments::complete_words(int argc, const char* const* 
 
 void Arguments::parse(int argc, const char* const* argv) {
   for (int i = 0; i < argc; ++i) command_line_ += (i > 0 ? " " : "") + quoted_word(argv[i]);
-  check_names(argc, argv);
   cxxopts::Options parser(program_, purpose_);
   for (const std::string& name : order_) {
     const Option& option = options_.at(name);
     add(parser, "", name, option.help, option.value, option.is_flag, "");
   }
   parser.parse_positional(positionals_);
+  parser.allow_unrecognised_options();  // which are named here, with a hint
   try {
     const std::vector<std::string> words = complete_words(argc, argv);
     std::vector<const char*> pointers;
@@ -187,8 +169,12 @@ void Arguments::parse(int argc, const char* const* argv) {
       if (result.count(name) == 0) continue;
       values_[name] = options_.at(name).is_flag ? "" : result[name].as<std::string>();
     }
-    if (!result.unmatched().empty()) {
-      throw UsageError("unexpected argument " + in_quotes(result.unmatched().front()));
+    for (const std::string& word : result.unmatched()) {
+      if (!word.starts_with("-")) throw UsageError("unexpected argument " + in_quotes(word));
+      const std::string option = word.substr(0, word.find('='));
+      const std::string hint = nearest_name(option.substr(std::min<std::size_t>(2, option.size())), order_);
+      throw UsageError("unknown option " + in_quotes(option) +
+                       (hint.empty() ? "" : "; did you mean '--" + hint + "'?"));
     }
   } catch (const cxxopts::exceptions::exception& error) {
     throw UsageError(error.what());

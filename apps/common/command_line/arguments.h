@@ -150,7 +150,6 @@ class Arguments {
   };
 
   Arguments& declare(const std::string& name, Option option);
-  void check_names(int argc, const char* const* argv) const;
   std::vector<std::string> complete_words(int argc, const char* const* argv) const;
   void check_given() const;
   [[noreturn]] void reject(const std::string& name, const std::string& expected,
