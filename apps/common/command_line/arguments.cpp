@@ -151,6 +151,15 @@ std::vector<std::string> Arguments::complete_words(int argc, const char* const* 
   return words;
 }
 
+/// Of the command line: nothing takes it.
+void Arguments::refuse_word(const std::string& word) const {
+  if (!word.starts_with("-")) throw UsageError("unexpected argument " + in_quotes(word));
+  const std::string option = word.substr(0, word.find('='));
+  const std::string hint = nearest_name(option.substr(std::min<std::size_t>(2, option.size())), order_);
+  throw UsageError("unknown option " + in_quotes(option) +
+                   (hint.empty() ? "" : "; did you mean '--" + hint + "'?"));
+}
+
 void Arguments::parse(int argc, const char* const* argv) {
   for (int i = 0; i < argc; ++i) command_line_ += (i > 0 ? " " : "") + quoted_word(argv[i]);
   cxxopts::Options parser(program_, purpose_);
@@ -159,7 +168,7 @@ void Arguments::parse(int argc, const char* const* argv) {
     add(parser, "", name, option.help, option.value, option.is_flag, "");
   }
   parser.parse_positional(positionals_);
-  parser.allow_unrecognised_options();  // which are named here, with a hint
+  parser.allow_unrecognised_options();  // refuse_word() names them, with a hint
   try {
     const std::vector<std::string> words = complete_words(argc, argv);
     std::vector<const char*> pointers;
@@ -169,13 +178,7 @@ void Arguments::parse(int argc, const char* const* argv) {
       if (result.count(name) == 0) continue;
       values_[name] = options_.at(name).is_flag ? "" : result[name].as<std::string>();
     }
-    for (const std::string& word : result.unmatched()) {
-      if (!word.starts_with("-")) throw UsageError("unexpected argument " + in_quotes(word));
-      const std::string option = word.substr(0, word.find('='));
-      const std::string hint = nearest_name(option.substr(std::min<std::size_t>(2, option.size())), order_);
-      throw UsageError("unknown option " + in_quotes(option) +
-                       (hint.empty() ? "" : "; did you mean '--" + hint + "'?"));
-    }
+    if (!result.unmatched().empty()) refuse_word(result.unmatched().front());
   } catch (const cxxopts::exceptions::exception& error) {
     throw UsageError(error.what());
   }
