@@ -8,7 +8,6 @@
 #include <map>
 
 #include "apps/common/command_line/program.h"
-#include "apps/common/running/threads.h"
 #include "autograd/kernels/fast/isa/isa.h"
 #include "data/sensors/rig.h"
 #include "hardware/ports/serial_port.h"

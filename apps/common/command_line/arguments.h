@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -38,6 +39,14 @@ auto read_option(const std::string& option, Work work) {
 /// `name`; empty when none is near: at most a third of its letters, at least two, may differ. Among equals,
 /// one that begins with `name`.
 std::string nearest_name(const std::string& name, const std::vector<std::string>& candidates);
+
+/// How many threads a program takes when none are asked for: what OpenMP says (OMP_NUM_THREADS, else the
+/// processors of the affinity mask), at most the cgroup's CPU quota rounded up.
+int default_threads();
+
+/// The quota in a cgroup's cpu.max ("200000 100000", "max 100000"), in processors rounded up; nullopt when
+/// there is none or the text cannot be read.
+std::optional<int> quota_of_cpu_max(std::string_view text);
 
 /// A file or folder that the command line names.
 struct NamedPath {
@@ -117,7 +126,7 @@ class Arguments {
   /// Whether that has happened.
   bool displaced() const { return displaced_; }
   bool quiet() const { return muted_ || flag("quiet"); }
-  /// --threads, or what the machine grants (apps/common/running/threads.h).
+  /// --threads, or default_threads().
   int threads() const;
 
   const std::string& program() const { return program_; }

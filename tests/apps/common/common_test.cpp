@@ -9,7 +9,6 @@
 #include "apps/common/output/output_folder.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
-#include "apps/common/running/threads.h"
 #include "io/files/file.h"
 #include "tests/support/test.h"
 
