@@ -3,7 +3,7 @@
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/output_folder.h"
 #include "io/files/file.h"
-#include "models/files/chain.h"
+#include "models/files/c_code.h"
 #include "models/files/onnx.h"
 
 namespace supertac {

@@ -15,7 +15,7 @@
 #include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
-#include "models/files/chain.h"
+#include "models/files/c_code.h"
 
 namespace supertac {
 namespace {

@@ -1,5 +1,6 @@
 #include "autograd/ops/activations.h"
 
+#include "autograd/kernels/exp.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/linear.h"
@@ -9,6 +10,7 @@
 namespace supertac::activations_test {
 
 using namespace test;
+using kernels::exp_same_bits, kernels::sigmoid_same_bits;
 
 TEST(Activations, HandComputed) {
   const Variable x(Tensor::of({4}, {-2, -0.5, 0, 3}));
@@ -64,48 +66,40 @@ TEST(Activations, RefusesBadSettings) {
   EXPECT_REFUSAL("clamp: low expects at most high, 1.000000, got 2.000000", clamp(x, 2, 1));
 }
 
-// f stored by the op itself and f as an op behind it: the same bytes, forwards and backwards.
-void expect_same_bytes(const std::function<Variable(const std::vector<Variable>&, bool fused)>& layer,
-                       const std::vector<Tensor>& inputs) {
-  std::vector<std::vector<Tensor>> found;
-  for (const bool fused : {true, false}) {
-    std::vector<Variable> leaves;
-    for (const Tensor& t : inputs) leaves.push_back(parameter(t));
-    const Variable y = layer(leaves, fused);
-    backward(sum(y * Variable(numbers(y.shape(), 9))));
-    std::vector<Tensor>& all = found.emplace_back(std::vector<Tensor>{y.value()});
-    for (const Variable& leaf : leaves) all.push_back(leaf.grad());
-  }
-  for (std::size_t i = 0; i < found[0].size(); ++i) ASSERT_TRUE(same_bytes(found[0][i], found[1][i])) << i;
-}
-
-TEST(FusedActivation, IsTheActivationBehindTheOp) {
-  for (const real slope : {kRelu, kLeakyRelu}) {
-    for (const Dim out : {1, 5, 16, 33}) {  // 1 takes the path of few outputs
-      const std::vector<Tensor> conv{numbers({2, 4, 4, 20}), numbers({3, 3, 20, out}, 2), numbers({out}, 3)};
-      expect_same_bytes(
-          [slope](const std::vector<Variable>& in, bool fused) {
-            const Variable y =
-                conv2d(in[0], in[1], in[2], {.padding = 1, .negative_slope = fused ? slope : kNoActivation});
-            return fused ? y : leaky_relu(y, slope);
-          },
-          conv);
-      expect_same_bytes(
-          [slope](const std::vector<Variable>& in, bool fused) {
-            return fused ? linear(in[0], in[1], in[2], slope)
-                         : leaky_relu(linear(in[0], in[1], in[2]), slope);
-          },
-          {numbers({7, 20}), numbers({20, out}, 2), numbers({out}, 3)});
-    }
-  }
-}
-
-TEST(FusedActivation, RefusesANegativeSlope) {
+TEST(Activations, OpsThatEndInOneRefuseANegativeSlope) {
   const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
   EXPECT_REFUSAL("linear: negative_slope expects 0 or more, got -0.500000", linear(x, w, b, real(-0.5)));
   const Variable line(Tensor::zeros({1, 4, 3})), taps(Tensor::zeros({3, 3, 5}));
   EXPECT_REFUSAL("conv1d: negative_slope expects 0 or more, got -0.500000",
                  conv1d(line, taps, b, {.padding = 1, .negative_slope = real(-0.5)}));
+}
+
+TEST(Exp, RelativeErrorIsAsDocumented) {
+  double worst = 0;
+  for (int i = -86'999; i < 88'000; ++i) {
+    const float x = static_cast<float>(i) * 1e-3F;
+    const double exact = std::exp(static_cast<double>(x));
+    worst = std::max(worst, std::abs(static_cast<double>(exp_same_bits(x)) / exact - 1));
+  }
+  EXPECT_LT(worst, 2e-7);
+}
+
+TEST(Exp, Limits) {
+  EXPECT_EQ(exp_same_bits(0.0F), 1.0F);
+  EXPECT_TRUE(std::isnormal(exp_same_bits(-1e30F)));
+  EXPECT_TRUE(std::isfinite(exp_same_bits(1e30F)));
+  EXPECT_EQ(exp_same_bits(std::numeric_limits<float>::infinity()), exp_same_bits(88.0F));
+  EXPECT_TRUE(std::isnan(exp_same_bits(std::numeric_limits<float>::quiet_NaN())));
+}
+
+TEST(Sigmoid, IsSymmetricAndMonotone) {
+  float before = 0;
+  for (int i = -4000; i <= 4000; ++i) {
+    const float x = static_cast<float>(i) * 1e-2F, s = sigmoid_same_bits(x);
+    EXPECT_NEAR(static_cast<double>(s + sigmoid_same_bits(-x)), 1, 2e-7);
+    EXPECT_GE(s, before);
+    before = s;
+  }
 }
 
 }  // namespace supertac::activations_test

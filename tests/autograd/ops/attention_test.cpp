@@ -1,6 +1,5 @@
 #include "autograd/ops/attention.h"
 
-#include "autograd/kernels/attention.h"
 #include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
 #include "tests/support/test.h"
@@ -14,23 +13,6 @@ TEST(Attention, HandComputed) {
   EXPECT_VALUES(global_mean(x).value(), {1, 2}, {3, 15});
   const Variable a(Tensor::of({1, 2, 2, 2}, {100, 0, 0, 0, 0, 0, 0, 5})), s(Tensor::of({1, 2}, {2, -1}));
   EXPECT_VALUES(gated_sum(a, x, s).value(), {1, 2, 2, 2}, {102, -10, 4, -20, 6, -30, 12, 5});
-}
-
-// Two images of two pixels and one channel: gradients are added, set or left out as their slots say.
-TEST(Attention, KernelsNeedNoGraph) {
-  const kernels::Maps maps{.images = 2, .pixels = 2, .channels = 1};
-  const std::array<real, 4> a{1, 2, 3, 4}, x{5, 6, 7, 8}, gy{1, 2, 3, 4};
-  const std::array<real, 2> s{10, 100};
-  std::array<real, 4> y{}, gx{1, 1, 1, 1};
-  std::array<real, 2> mean{}, gs{-1, -1};
-  kernels::gated_sum(maps, a.data(), x.data(), s.data(), y.data());
-  EXPECT_EQ(y, (std::array<real, 4>{51, 62, 703, 804}));
-  kernels::gated_sum_grad(maps, gy.data(), x.data(), s.data(), {}, {gx.data(), Into::add},
-                          {gs.data(), Into::overwrite});
-  EXPECT_EQ(gx, (std::array<real, 4>{11, 21, 301, 401}));
-  EXPECT_EQ(gs, (std::array<real, 2>{17, 53}));
-  kernels::global_mean(maps, x.data(), mean.data());
-  EXPECT_EQ(mean, (std::array<real, 2>{5.5, 7.5}));
 }
 
 // No pixels, but gates: their gradients are sums of nothing.

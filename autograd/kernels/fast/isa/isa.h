@@ -47,17 +47,19 @@ inline constexpr Dim kTransformChannels = 16;
 /// share few sets of the first cache.
 inline constexpr Dim place_step(Dim tiles, Dim channels) { return tiles * channels + 16; }
 
-/// Weights [3][3][weights] and their places u[(6 i + j) * step + k] for the same transforms.
+/// Filters g [3][3][weights], `weights` = cin * cout, and their places for the same transforms: place (i, j)
+/// of weight k is u[((square + 2) i + j) * step + k].
 struct FilterJob {
-  Dim weights = 0;  // a multiple of kTransformChannels
-  Dim step = 0;
-  Dim square = 4;         // pixels each way: 4, or 2 (map_patches, map_squares)
+  Dim weights = 0;        // a multiple of kTransformChannels
+  Dim step = 0;           // numbers from one place to the next, `weights` or more
+  Dim square = 4;         // pixels of an output tile each way: 4, or 2 (map_patches, map_squares)
   Into into = Into::add;  // of filter_grads
 };
 
 /// Instructions that plain loops (each.h) are compiled for.
 enum class Vectors { baseline, avx2, avx512 };
 
+/// The kernels of one instruction set. Arrays are the caller's; sizes count numbers of `real`.
 struct IsaKernels {
   std::string_view name;
   Vectors vectors = Vectors::baseline;

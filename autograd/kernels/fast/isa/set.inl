@@ -3,9 +3,6 @@
 
 #include "autograd/kernels/fast/isa/kernels.inl"
 #include "autograd/kernels/fast/isa/winograd.inl"
-
-#include "autograd/kernels/fast/isa/tiles.inl"
-
 #include "autograd/kernels/fast/isa/inference.inl"
 
 // A table is a constant of the program (constinit): no code of this instruction set may run before the
