@@ -5,6 +5,7 @@
 // channels of one pixel lie side by side, which is what the convolution kernels read and write.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -29,6 +30,10 @@ struct Slot {
   real* data = nullptr;
   Into into = Into::add;
   explicit operator bool() const { return data != nullptr; }
+  /// For kernels that add only: zeros in `count` places that are to be overwritten.
+  void begin(Dim count) const {
+    if (data != nullptr && into == Into::overwrite) std::fill_n(data, count, real(0));
+  }
 };
 inline constexpr int kMaxRank = 4;
 

@@ -54,7 +54,7 @@ inline void gated_sum_grad(const Maps& maps, const real* gy, const real* x, cons
   each_into(maps.images * maps.pixels * maps.channels, ga, [=](Dim i) { return gy[i]; });
   each_element_into(maps, gx, [=](Dim i, Dim k) { return gy[i] * s[k]; });
   if (!gs) return;
-  if (gs.into == Into::overwrite) std::fill_n(gs.data, maps.images * maps.channels, real(0));
+  gs.begin(maps.images * maps.channels);
   each_element(maps, [=, to = gs.data](Dim i, Dim k) { to[k] += gy[i] * x[i]; });
 }
 

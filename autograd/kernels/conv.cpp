@@ -44,17 +44,19 @@ void conv(const ConvSizes& s, const real* x, const real* w, const real* bias, re
 }
 
 // gx [p, i] = or += sum of gy[q, o] w[tap, i, o]
-void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, Into into, real* gx) {
-  if (!is_plain()) return fast::conv_grad_x(s, gy, w, into, gx);
-  if (into == Into::overwrite) std::fill_n(gx, s.images * s.in_pixels() * s.cin, real(0));
-  for_each_product(s, [&](Dim a, Dim b, Dim c) { gx[a] = std::fma(gy[c], w[b], gx[a]); });
+void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, Slot gx) {
+  if (!gx) return;
+  if (!is_plain()) return fast::conv_grad_x(s, gy, w, gx);
+  gx.begin(s.images * s.in_pixels() * s.cin);
+  for_each_product(s, [&](Dim a, Dim b, Dim c) { gx.data[a] = std::fma(gy[c], w[b], gx.data[a]); });
 }
 
 // gw [tap, i, o] = or += sum of x[p, i] gy[q, o]
-void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, Into into, real* gw) {
-  if (!is_plain()) return fast::conv_grad_w(s, x, gy, into, gw);
-  if (into == Into::overwrite) std::fill_n(gw, s.conv.taps() * s.cin * s.cout, real(0));
-  for_each_product(s, [&](Dim a, Dim b, Dim c) { gw[b] = std::fma(x[a], gy[c], gw[b]); });
+void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, Slot gw) {
+  if (!gw) return;
+  if (!is_plain()) return fast::conv_grad_w(s, x, gy, gw);
+  gw.begin(s.conv.taps() * s.cin * s.cout);
+  for_each_product(s, [&](Dim a, Dim b, Dim c) { gw.data[b] = std::fma(x[a], gy[c], gw.data[b]); });
 }
 
 // Rows are images of one pixel: x [n, i], w [i, o], y [n, o].
@@ -63,19 +65,20 @@ void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const rea
   if (!is_plain()) return fast::linear(rows, cin, cout, x, w, bias, negative_slope, y);
   conv({{}, rows, cin, cout}, x, w, bias, negative_slope, y);
 }
-void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx) {
-  if (!is_plain()) return fast::linear_grad_x(rows, cin, cout, gy, w, into, gx);
-  conv_grad_x({{}, rows, cin, cout}, gy, w, into, gx);
+void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Slot gx) {
+  if (gx && !is_plain()) return fast::linear_grad_x(rows, cin, cout, gy, w, gx);
+  conv_grad_x({{}, rows, cin, cout}, gy, w, gx);
 }
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw) {
-  if (!is_plain()) return fast::linear_grad_w(rows, cin, cout, x, gy, into, gw);
-  conv_grad_w({{}, rows, cin, cout}, x, gy, into, gw);
+void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Slot gw) {
+  if (gw && !is_plain()) return fast::linear_grad_w(rows, cin, cout, x, gy, gw);
+  conv_grad_w({{}, rows, cin, cout}, x, gy, gw);
 }
 
 // gb[o] = or += sum over rows of gy[row,o]
-void bias_grad(Dim rows, Dim cout, const real* gy, Into into, real* gb) {
+void bias_grad(Dim rows, Dim cout, const real* gy, Slot gb) {
   constexpr Dim kAtOnce = 16;  // sums that stay in registers
-  if (into == Into::overwrite) std::fill_n(gb, cout, real(0));
+  if (!gb) return;
+  gb.begin(cout);
   for (Dim first = 0; first < rows; first += kRowsPerPiece) {
     const Dim last = std::min(rows, first + kRowsPerPiece);
     run_loop([=] {
@@ -89,7 +92,7 @@ void bias_grad(Dim rows, Dim cout, const real* gy, Into into, real* gb) {
           for (Dim row = first; row < last; ++row)
             for (Dim k = 0; k < count; ++k) sum[k] += gy[row * cout + c + k];
         }
-        for (Dim k = 0; k < count; ++k) gb[c + k] += sum[k];
+        for (Dim k = 0; k < count; ++k) gb.data[c + k] += sum[k];
       }
     });
   }

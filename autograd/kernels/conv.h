@@ -1,6 +1,7 @@
 // Convolutions, transposed convolutions and linear layers over a batch, with gradients, callable without a
-// graph. Everything is channels-last: the channels of one pixel lie side by side. "= or +=" is what `into`
-// says. Nothing is checked, and no result may overlap an input; the ops refuse what is wrong.
+// graph. Everything is channels-last: the channels of one pixel lie side by side. "= or +=" is what a Slot
+// says, and nothing is computed for an empty one. Nothing is checked, and no result may overlap an input; the
+// ops refuse what is wrong.
 #pragma once
 
 #include <compare>
@@ -84,16 +85,16 @@ void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias
           real* y);
 /// gx [images, in_pixels, cin] = or += the transpose of conv (without f) applied to gy [images, out_pixels,
 /// cout].
-void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx);
+void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Slot gx);
 /// gw [tap, i, o] = or += the sum of x[p, i] gy[q, o] over all images and the pixels p, q that the tap joins.
-void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Into into, real* gw);
+void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Slot gw);
 /// A linear layer is a convolution of maps of one pixel: y [rows, cout] = f(bias + x [rows, cin] w [cin,
 /// cout]), gx = or += gy w^T, gw = or += x^T gy.
 void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
             real* y);
-void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx);
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw);
+void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Slot gx);
+void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Slot gw);
 /// gb [cout] = or += the sum of gy [rows, cout] over rows: the pixels of all images.
-void bias_grad(Dim rows, Dim cout, const real* gy, Into into, real* gb);
+void bias_grad(Dim rows, Dim cout, const real* gy, Slot gb);
 
 }  // namespace supertac::kernels

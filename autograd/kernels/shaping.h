@@ -13,13 +13,14 @@ struct Columns {
   Dim width, at;
 };
 /// to[r, t.at + i] = or += from[r, f.at + i] for each row r and i < length
-inline void move_columns(Dim rows, Dim length, const real* from, Columns f, Into into, real* to, Columns t) {
+inline void move_columns(Dim rows, Dim length, const real* from, Columns f, Slot to, Columns t) {
+  if (!to) return;
   for (Dim r = 0; r < rows; ++r) {
     const real* source = from + r * f.width + f.at;
-    real* target = to + r * t.width + t.at;
-    if (into == Into::overwrite && length == 4) {
+    real* target = to.data + r * t.width + t.at;
+    if (to.into == Into::overwrite && length == 4) {
       std::copy_n(source, 4, target);  // one move
-    } else if (into == Into::overwrite) {
+    } else if (to.into == Into::overwrite) {
       std::copy_n(source, length, target);
     } else {
       for (Dim i = 0; i < length; ++i) target[i] += source[i];
@@ -28,12 +29,13 @@ inline void move_columns(Dim rows, Dim length, const real* from, Columns f, Into
 }
 
 /// to[n, j, i] = or += from[n, i, j]
-inline void transpose(Dim images, Dim rows, Dim columns, const real* from, Into into, real* to) {
-  for (Dim n = 0; n < images; ++n, from += rows * columns, to += rows * columns)
+inline void transpose(Dim images, Dim rows, Dim columns, const real* from, Slot to) {
+  if (!to) return;
+  for (Dim n = 0; n < images; ++n, from += rows * columns, to.data += rows * columns)
     for (Dim i = 0; i < rows; ++i)
       for (Dim j = 0; j < columns; ++j) {
-        real& element = to[j * rows + i];
-        element = from[i * columns + j] + (into == Into::add ? element : 0);
+        real& element = to.data[j * rows + i];
+        element = from[i * columns + j] + (to.into == Into::add ? element : 0);
       }
 }
 

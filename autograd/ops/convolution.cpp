@@ -61,10 +61,9 @@ Variable convolve(const char* op, const Variable& x, const Variable& w, const Va
   kernels::conv(sizes, x.value().data(), w.value().data(), b.value().data(), o.negative_slope, y.data());
   const auto reverse = [sizes, slope = o.negative_slope](Backward& g) {
     const real* gs = before_activation(g, slope);
-    if (const Slot gx = g.slot_of(0)) kernels::conv_grad_x(sizes, gs, g.value(1).data(), gx.into, gx.data);
-    if (const Slot gw = g.slot_of(1)) kernels::conv_grad_w(sizes, g.value(0).data(), gs, gw.into, gw.data);
-    if (const Slot gb = g.slot_of(2))
-      kernels::bias_grad(sizes.images * sizes.out_pixels(), sizes.cout, gs, gb.into, gb.data);
+    kernels::conv_grad_x(sizes, gs, g.value(1).data(), g.slot_of(0));
+    kernels::conv_grad_w(sizes, g.value(0).data(), gs, g.slot_of(1));
+    kernels::bias_grad(sizes.images * sizes.out_pixels(), sizes.cout, gs, g.slot_of(2));
   };
   const OpSettings settings{.conv = s, .negative_slope = o.negative_slope};
   return record(op, y, {&x, &w, &b}, reverse, &settings);

@@ -20,11 +20,9 @@ Variable linear(const Variable& x, const Variable& w, const Variable& b, real ne
                   y.data());
   const auto reverse = [rows, in, out, negative_slope](Backward& g) {
     const real* gs = before_activation(g, negative_slope);
-    if (const Slot gx = g.slot_of(0))
-      kernels::linear_grad_x(rows, in, out, gs, g.value(1).data(), gx.into, gx.data);
-    if (const Slot gw = g.slot_of(1))
-      kernels::linear_grad_w(rows, in, out, g.value(0).data(), gs, gw.into, gw.data);
-    if (const Slot gb = g.slot_of(2)) kernels::bias_grad(rows, out, gs, gb.into, gb.data);
+    kernels::linear_grad_x(rows, in, out, gs, g.value(1).data(), g.slot_of(0));
+    kernels::linear_grad_w(rows, in, out, g.value(0).data(), gs, g.slot_of(1));
+    kernels::bias_grad(rows, out, gs, g.slot_of(2));
   };
   const OpSettings settings{.negative_slope = negative_slope};
   return record("linear", y, {&x, &w, &b}, reverse, &settings);

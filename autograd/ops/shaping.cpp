@@ -33,11 +33,9 @@ Shape with_last(const Shape& shape, Dim last) {
 Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows, Dim columns,
                          const Shape& shape) {
   Tensor y(shape);
-  kernels::transpose(images, rows, columns, x.value().data(), Into::overwrite, y.data());
-  return record(op, y, {&x}, [=](Backward& g) {
-    if (const Slot gx = g.slot_of(0))
-      kernels::transpose(images, columns, rows, g.gy().data(), gx.into, gx.data);
-  });
+  kernels::transpose(images, rows, columns, x.value().data(), {y.data(), Into::overwrite});
+  return record(op, y, {&x},
+                [=](Backward& g) { kernels::transpose(images, columns, rows, g.gy().data(), g.slot_of(0)); });
 }
 
 }  // namespace
@@ -74,7 +72,7 @@ Variable concat(std::span<const Variable> xs) {
   Dim at = 0;
   for (const Variable& x : xs) {
     const Dim last = x.dim(x.rank() - 1);
-    move_columns(rows, last, x.value().data(), {last, 0}, Into::overwrite, y.data(), {width, at});
+    move_columns(rows, last, x.value().data(), {last, 0}, {y.data(), Into::overwrite}, {width, at});
     at += last;
   }
   return record("concat", y, std::span<const Variable* const>(inputs.data(), xs.size()),
@@ -83,8 +81,7 @@ Variable concat(std::span<const Variable> xs) {
                   for (std::size_t i = 0; i < count; ++i) {
                     const Shape& shape = g.value(i).shape();
                     const Dim last = shape[shape.rank() - 1];
-                    if (const Slot gx = g.slot_of(i))
-                      move_columns(rows, last, g.gy().data(), {width, from}, gx.into, gx.data, {last, 0});
+                    move_columns(rows, last, g.gy().data(), {width, from}, g.slot_of(i), {last, 0});
                     from += last;
                   }
                 });
@@ -109,8 +106,8 @@ Variable take_runs(const Variable& x, const Runs& r) {
   Tensor y(with_last(x.shape(), r.width));
   const Dim rows = x.size() / width;
   for (Dim at = 0; at < r.width; at += r.run) {
-    move_columns(rows, r.run, x.value().data(), {width, r.first + at / r.run * r.step}, Into::overwrite,
-                 y.data(), {r.width, at});
+    move_columns(rows, r.run, x.value().data(), {width, r.first + at / r.run * r.step},
+                 {y.data(), Into::overwrite}, {r.width, at});
   }
   const OpSettings settings{.first = r.first, .run = r.run, .step = r.step};
   return record(
@@ -127,8 +124,8 @@ Variable last_frame(const Variable& x, Dim rows, Dim columns, Dim channels) {
   check_shape("last_frame", "windows", x, {images, std::max<Dim>(frames, 1), signals});
   check_no_gradient("last_frame", "windows", x);
   Tensor y(Shape{images, rows, columns, channels});
-  move_columns(images, signals, x.value().data(), {frames * signals, (frames - 1) * signals}, Into::overwrite,
-               y.data(), {signals, 0});
+  move_columns(images, signals, x.value().data(), {frames * signals, (frames - 1) * signals},
+               {y.data(), Into::overwrite}, {signals, 0});
   return record("last_frame", y, {&x}, [](Backward&) {});
 }
 

@@ -141,9 +141,9 @@ void orthogonalise(Dim rows, Dim columns, real* x) {
   const auto factor = static_cast<real>(1 / (std::sqrt(sum_of_squares(size, x)) + 1e-7));
   kernels::each(size, [=](Dim i) { from[i] = factor * x[i]; });
   if (wide) {
-    kernels::linear_grad_x(rows, rows, columns, from, from, Into::overwrite, s);
+    kernels::linear_grad_x(rows, rows, columns, from, from, {s, Into::overwrite});
   } else {
-    kernels::linear_grad_w(rows, columns, columns, from, from, Into::overwrite, s);
+    kernels::linear_grad_w(rows, columns, columns, from, from, {s, Into::overwrite});
   }
   const auto multiply = [side](const real* a, const real* b, real* y) {
     kernels::linear(side, side, side, a, b, nullptr, 1, y);

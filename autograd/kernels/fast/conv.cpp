@@ -32,21 +32,21 @@ void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias
   gather_batch(job, s.images, s.geometry->in_pixels, s.geometry->out_pixels, x, y);
 }
 
-void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx) {
+void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Slot gx) {
   const ConvTask s = task_of(sizes);
-  if (is_narrow(s)) return narrow_grad_x(s, gy, w, into, gx);
-  if (is_winograd(s)) return winograd_grad_x(s, gy, w, into, gx);
+  if (is_narrow(s)) return narrow_grad_x(s, gy, w, gx);
+  if (is_winograd(s)) return winograd_grad_x(s, gy, w, gx);
   const Tensor wt = transposed_weights(w, s.geometry->taps, s.cin, s.cout);
-  const GatherJob job{&s.geometry->backward, wt.data(), nullptr, s.cout, s.cin, into, 1};
-  gather_batch(job, s.images, s.geometry->out_pixels, s.geometry->in_pixels, gy, gx);
+  const GatherJob job{&s.geometry->backward, wt.data(), nullptr, s.cout, s.cin, gx.into, 1};
+  gather_batch(job, s.images, s.geometry->out_pixels, s.geometry->in_pixels, gy, gx.data);
 }
 
 // A chunk of images passes all taps before the next one, while it is in the cache.
-void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Into into, real* gw) {
+void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Slot gw) {
   const ConvTask s = task_of(sizes);
-  if (s.images == 0 && into == Into::overwrite) std::fill_n(gw, sizes.conv.taps() * s.cin * s.cout, real(0));
-  if (is_narrow(s)) return narrow_grad_w(s, x, gy, into, gw);
-  if (is_winograd(s)) return winograd_grad_w(s, x, gy, into, gw);
+  if (s.images == 0) gw.begin(sizes.conv.taps() * s.cin * s.cout);
+  if (is_narrow(s)) return narrow_grad_w(s, x, gy, gw);
+  if (is_winograd(s)) return winograd_grad_w(s, x, gy, gw);
   const auto outer = isa_kernels().outer;
   const Geometry& g = *s.geometry;
   const Dim chunk = std::max<Dim>(1, kRowsPerPiece / g.out_pixels);
@@ -54,13 +54,13 @@ void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Into int
     OuterJob job{nullptr,
                  x + n * g.in_pixels * s.cin,
                  gy + n * g.out_pixels * s.cout,
-                 gw,
+                 gw.data,
                  std::min(chunk, s.images - n),
                  g.in_pixels,
                  g.out_pixels,
                  s.cin,
                  s.cout,
-                 n == 0 ? into : Into::add};
+                 n == 0 ? gw.into : Into::add};
     for (const TapPairs& pairs : g.pairs) {
       job.pairs = &pairs;
       outer(job);
@@ -74,18 +74,18 @@ void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const rea
   isa_kernels().gather_rows({nullptr, w, bias, cin, cout, Into::overwrite, negative_slope}, x, y, rows);
 }
 
-void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx) {
+void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Slot gx) {
   const Tensor wt = transposed_weights(w, 1, cin, cout);
-  isa_kernels().gather_rows({nullptr, wt.data(), nullptr, cout, cin, into, 1}, gy, gx, rows);
+  isa_kernels().gather_rows({nullptr, wt.data(), nullptr, cout, cin, gx.into, 1}, gy, gx.data, rows);
 }
 
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw) {
+void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Slot gw) {
   static const TapPairs kOnePixel{{0}, {0}};
   const auto outer = isa_kernels().outer;
-  if (rows == 0 && into == Into::overwrite) std::fill_n(gw, cin * cout, real(0));
+  if (rows == 0) gw.begin(cin * cout);
   for (Dim n = 0; n < rows; n += kRowsPerPiece) {
-    outer({&kOnePixel, x + n * cin, gy + n * cout, gw, std::min(kRowsPerPiece, rows - n), 1, 1, cin, cout,
-           n == 0 ? into : Into::add});
+    outer({&kOnePixel, x + n * cin, gy + n * cout, gw.data, std::min(kRowsPerPiece, rows - n), 1, 1, cin,
+           cout, n == 0 ? gw.into : Into::add});
   }
 }
 

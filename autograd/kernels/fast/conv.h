@@ -9,14 +9,14 @@ namespace supertac::kernels::fast {
 
 void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real negative_slope,
           real* y);
-void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx);
+void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Slot gx);
 /// Partial sums over fixed groups of images, added in order.
-void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Into into, real* gw);
+void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Slot gw);
 
 void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
             real* y);
-void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx);
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw);
+void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Slot gx);
+void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Slot gw);
 
 /// w [taps][cin][cout] -> [taps][cout][cin]
 Tensor transposed_weights(const real* w, Dim taps, Dim cin, Dim cout);
@@ -33,8 +33,8 @@ bool is_narrow(const ConvTask& task);
 
 void narrow_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,
                  real* y);
-void narrow_grad_x(const ConvTask& task, const real* gy, const real* w, Into into, real* gx);
-void narrow_grad_w(const ConvTask& task, const real* x, const real* gy, Into into, real* gw);
+void narrow_grad_x(const ConvTask& task, const real* gy, const real* w, Slot gx);
+void narrow_grad_w(const ConvTask& task, const real* x, const real* gy, Slot gw);
 
 // In winograd.cpp:
 /// Whether conv() and its gradients take this way: four images or more, of four 4x4 squares or more (8x8,
@@ -44,7 +44,7 @@ bool is_winograd(const ConvTask& task);
 
 void winograd_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,
                    real* y);
-void winograd_grad_x(const ConvTask& task, const real* gy, const real* w, Into into, real* gx);
-void winograd_grad_w(const ConvTask& task, const real* x, const real* gy, Into into, real* gw);
+void winograd_grad_x(const ConvTask& task, const real* gy, const real* w, Slot gx);
+void winograd_grad_w(const ConvTask& task, const real* x, const real* gy, Slot gw);
 
 }  // namespace supertac::kernels

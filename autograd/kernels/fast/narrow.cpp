@@ -140,21 +140,21 @@ void narrow_conv(const ConvTask& s, const real* x, const real* w, const real* bi
     std::transform(y, y + s.images * pixels_of(s) * s.cout, y, Rectifier(negative_slope));
 }
 
-void narrow_grad_x(const ConvTask& s, const real* gy, const real* w, Into into, real* gx) {
+void narrow_grad_x(const ConvTask& s, const real* gy, const real* w, Slot gx) {
   const Tensor wt = fast::transposed_weights(w, s.geometry->taps, s.cin, s.cout);
-  isa_kernels().gather_rows({nullptr, wt.data(), nullptr, sums_of(s), s.cin, into, 1}, expanded(s, gy).data(),
-                            gx, s.images * pixels_of(s));
+  isa_kernels().gather_rows({nullptr, wt.data(), nullptr, sums_of(s), s.cin, gx.into, 1},
+                            expanded(s, gy).data(), gx.data, s.images * pixels_of(s));
 }
 
-void narrow_grad_w(const ConvTask& s, const real* x, const real* gy, Into into, real* gw) {
+void narrow_grad_w(const ConvTask& s, const real* x, const real* gy, Slot gw) {
   Tensor inside(Shape{sums_of(s), s.cin});
-  fast::linear_grad_w(s.images * pixels_of(s), sums_of(s), s.cin, expanded(s, gy).data(), x, Into::overwrite,
-                      inside.data());
+  fast::linear_grad_w(s.images * pixels_of(s), sums_of(s), s.cin, expanded(s, gy).data(), x,
+                      {inside.data(), Into::overwrite});
   for (Dim t = 0; t < s.geometry->taps; ++t) {
     for (Dim i = 0; i < s.cin; ++i) {
-      for (Dim o = 0; o < s.cout; ++o, ++gw) {
+      for (Dim o = 0; o < s.cout; ++o, ++gw.data) {
         const real sum = inside.data()[(t * s.cout + o) * s.cin + i];
-        *gw = into == Into::add ? *gw + sum : sum + 0;
+        *gw.data = gw.into == Into::add ? *gw.data + sum : sum + 0;
       }
     }
   }

@@ -42,8 +42,8 @@ TileJob squares_of(const ConvTask& s, Dim first, Dim count) {
 }
 
 // Of the places u of the weights.
-void filter(const ConvTask& s, const real* x, const Tensor& u, const real* bias, Into into,
-            real negative_slope, real* y) {
+void filter(const ConvTask& s, const real* x, const Tensor& u, const real* bias, real negative_slope,
+            Slot y) {
   const IsaKernels& isa = isa_kernels();
   const Dim tiles = s.images * tiles_of(s), strip = std::min(kTilesPerStrip, tiles);
   Tensor v(Shape{kPlaces, place_step(strip, s.cin)}), m(Shape{kPlaces, place_step(strip, s.cout)});
@@ -51,7 +51,7 @@ void filter(const ConvTask& s, const real* x, const Tensor& u, const real* bias,
     const Dim count = std::min(strip, tiles - first);
     isa.patches(patches_of(s, first, count), x, v.data());
     isa.places({kPlaces, count, s.cin, s.cout, place_of(s)}, v.data(), u.data(), m.data());
-    isa.squares(squares_of(s, first, count), m.data(), bias, into, negative_slope, y);
+    isa.squares(squares_of(s, first, count), m.data(), bias, y.into, negative_slope, y.data);
   }
 }
 
@@ -66,17 +66,17 @@ void winograd_conv(const ConvTask& s, const real* x, const real* w, const real* 
                    real* y) {
   Tensor u(Shape{kPlaces, place_of(s)});
   isa_kernels().filters({s.cin * s.cout, place_of(s)}, w, u.data());
-  filter(s, x, u, bias, Into::overwrite, negative_slope, y);
+  filter(s, x, u, bias, negative_slope, {y, Into::overwrite});
 }
 
-void winograd_grad_x(const ConvTask& s, const real* gy, const real* w, Into into, real* gx) {
+void winograd_grad_x(const ConvTask& s, const real* gy, const real* w, Slot gx) {
   Tensor u(Shape{kPlaces, place_of(s)});
   isa_kernels().filters({s.cin * s.cout, place_of(s)}, turned(s.cin, s.cout, w).data(), u.data());
-  filter({s.geometry, s.images, s.cout, s.cin}, gy, u, nullptr, into, 1, gx);
+  filter({s.geometry, s.images, s.cout, s.cin}, gy, u, nullptr, 1, gx);
 }
 
 // du[place] = sum over tiles of (B^T d B)^T (A gy A^T),   gw = or += G^T du G
-void winograd_grad_w(const ConvTask& s, const real* x, const real* gy, Into into, real* gw) {
+void winograd_grad_w(const ConvTask& s, const real* x, const real* gy, Slot gw) {
   const IsaKernels& isa = isa_kernels();
   const Dim tiles = s.images * tiles_of(s), piece = std::min(kTilesPerPiece, tiles);
   Tensor v(Shape{kPlaces, place_step(piece, s.cin)}), m(Shape{kPlaces, place_step(piece, s.cout)});
@@ -88,10 +88,10 @@ void winograd_grad_w(const ConvTask& s, const real* x, const real* gy, Into into
     for (Dim place = 0; place < kPlaces; ++place) {
       fast::linear_grad_w(count, s.cin, s.cout, v.data() + place * place_step(count, s.cin),
                           m.data() + place * place_step(count, s.cout),
-                          first == 0 ? Into::overwrite : Into::add, du.data() + place * place_of(s));
+                          {du.data() + place * place_of(s), first == 0 ? Into::overwrite : Into::add});
     }
   }
-  isa.filter_grads({s.cin * s.cout, place_of(s), 4, into}, du.data(), gw);
+  isa.filter_grads({s.cin * s.cout, place_of(s), 4, gw.into}, du.data(), gw.data);
 }
 
 }  // namespace supertac::kernels

@@ -20,7 +20,7 @@ static void input_step(Compiler& compiler, const TracedOp& op) {
       for (Dim i = 0; i < y.height; ++i, line += y.line(), from += y.width * runs.step)
         for (Dim k = 0; k < y.channels; k += runs.run)
           kernels::move_columns(y.width, runs.run, from, {runs.step, k / runs.run * runs.apart},
-                                Into::overwrite, line, {y.channels, k});
+                                {line, Into::overwrite}, {y.channels, k});
     }
   });
 }
@@ -116,8 +116,8 @@ static void unflatten_step(Compiler& compiler, const TracedOp& op) {
   compiler.add_step([=](const Block& b) {
     const Dim run = y.width * y.channels;
     for (Dim n = 0; n < b.images; ++n) {
-      kernels::move_columns(y.height, run, b.begin(x) + n * x.image(), {run, 0}, Into::overwrite,
-                            b.first_pixel(y) + n * y.image(), {y.line(), 0});
+      kernels::move_columns(y.height, run, b.begin(x) + n * x.image(), {run, 0},
+                            {b.first_pixel(y) + n * y.image(), Into::overwrite}, {y.line(), 0});
     }
   });
 }
@@ -129,7 +129,7 @@ static void concat_step(Compiler& compiler, const TracedOp& op) {
   for (const Variable& input : op.inputs) {
     const FeatureMap x = compiler.map_of(input);
     compiler.add_step([=](const Block& b) {
-      kernels::move_columns(b.images, x.channels, b.begin(x), {x.channels, 0}, Into::overwrite, b.begin(y),
+      kernels::move_columns(b.images, x.channels, b.begin(x), {x.channels, 0}, {b.begin(y), Into::overwrite},
                             {y.channels, at});
     });
     at += x.channels;

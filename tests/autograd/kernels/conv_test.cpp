@@ -95,12 +95,12 @@ void expect_plain_is_fast(const ConvSizes& s) {
   for (const Into into : {Into::overwrite, Into::add}) {
     expect_plain_is_fast("gx", same_order, [&] {
       Tensor gx = numbers(x.shape(), 5);
-      conv_grad_x(s, gy.data(), w.data(), into, gx.data());
+      conv_grad_x(s, gy.data(), w.data(), {gx.data(), into});
       return gx;
     });
   }
   const auto grad_w = [&](Into into, Tensor gw) {
-    conv_grad_w(s, x.data(), gy.data(), into, gw.data());
+    conv_grad_w(s, x.data(), gy.data(), {gw.data(), into});
     return gw;
   };
   for (const Into into : {Into::overwrite, Into::add}) {  // fast/ sums images apart before it adds them
@@ -152,18 +152,18 @@ TEST(LinearKernels, PlainIsFast) {
         for (const Into into : {Into::overwrite, Into::add}) {
           expect_plain_is_fast("gx", true, [&] {
             Tensor gx = numbers(x.shape(), 5);
-            linear_grad_x(rows, cin, cout, gy.data(), w.data(), into, gx.data());
+            linear_grad_x(rows, cin, cout, gy.data(), w.data(), {gx.data(), into});
             return gx;
           });
         }
         expect_plain_is_fast("gw", rows <= kRowsPerPiece, [&] {
           Tensor gw = numbers(w.shape(), 6);
-          linear_grad_w(rows, cin, cout, x.data(), gy.data(), Into::overwrite, gw.data());
+          linear_grad_w(rows, cin, cout, x.data(), gy.data(), {gw.data(), Into::overwrite});
           return gw;
         });
         Tensor gb = numbers({cout}, 7), added = Tensor::zeros({cout});
-        bias_grad(rows, cout, gy.data(), Into::overwrite, gb.data());
-        bias_grad(rows, cout, gy.data(), Into::add, added.data());
+        bias_grad(rows, cout, gy.data(), {gb.data(), Into::overwrite});
+        bias_grad(rows, cout, gy.data(), {added.data(), Into::add});
         EXPECT_TRUE(same_bytes(gb, added));
       }
     }
