@@ -1,18 +1,13 @@
 #include "autograd/tensor.h"
 
 #include <algorithm>
-#include <new>
-#include <utility>
 
 #include "autograd/kernels/fast/pool.h"
 #include "autograd/record.h"
 
 namespace supertac {
 
-namespace {
-constexpr Dim kMaxElements = Dim{1} << 40;
-constexpr std::size_t kHeader = 64;  // the buffer's header; the values start on the next cache line
-}  // namespace
+static constexpr Dim kMaxElements = Dim{1} << 40;
 
 Shape::Shape(std::initializer_list<Dim> dims) : Shape(std::span<const Dim>(dims.begin(), dims.size())) {}
 
@@ -41,10 +36,9 @@ std::string Shape::text() const {
 }
 
 Tensor::Tensor(const Shape& shape) : size_(shape.elements()), shape_(shape) {
-  const std::size_t bytes = kHeader + static_cast<std::size_t>(size_) * sizeof(real);
-  void* block = pool_allocate(bytes);
-  buffer_ = new (block) Buffer{{1}, bytes};
-  values_ = reinterpret_cast<real*>(static_cast<std::byte*>(block) + kHeader);
+  const std::size_t bytes = static_cast<std::size_t>(size_) * sizeof(real);
+  values_ = {static_cast<real*>(pool_allocate(bytes)), [bytes](real* values) { pool_release(values, bytes); },
+             PoolAllocator<real>()};
 }
 
 Tensor Tensor::full(const Shape& shape, real value) {
@@ -62,42 +56,18 @@ Tensor Tensor::of(const Shape& shape, std::span<const real> values) {
   return t;
 }
 
-Tensor::Tensor(const Tensor& other) noexcept
-    : buffer_(other.buffer_), values_(other.values_), size_(other.size_), shape_(other.shape_) {
-  if (buffer_ != nullptr) buffer_->users.fetch_add(1, std::memory_order_relaxed);
-}
-
-Tensor::Tensor(Tensor&& other) noexcept { swap(other); }
-
-Tensor& Tensor::operator=(Tensor other) noexcept {
-  swap(other);
-  return *this;
-}
-
-void Tensor::swap(Tensor& other) noexcept {
-  std::swap(buffer_, other.buffer_);
-  std::swap(values_, other.values_);
-  std::swap(size_, other.size_);
-  std::swap(shape_, other.shape_);
-}
-
-Tensor::~Tensor() {
-  if (buffer_ != nullptr && buffer_->users.fetch_sub(1, std::memory_order_acq_rel) == 1)
-    pool_release(buffer_, buffer_->bytes);
-}
-
 Tensor Tensor::clone() const {
   if (!defined()) return {};
   Tensor t(shape_);
-  std::copy_n(values_, size_, t.values_);
+  std::copy_n(data(), size_, t.data());
   return t;
 }
 
-void Tensor::fill(real value) { std::fill_n(values_, size_, value); }
+void Tensor::fill(real value) { std::ranges::fill(values(), value); }
 
 real Tensor::item() const {
-  if (size_ != 1) refuse("item", "the tensor", "one element", shape_.text());
-  return values_[0];
+  if (size() != 1) refuse("item", "the tensor", "one element", text());
+  return *values_;
 }
 
 }  // namespace supertac

@@ -7,9 +7,9 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <initializer_list>
+#include <memory>
 #include <span>
 #include <string>
 
@@ -71,23 +71,18 @@ class Tensor {
     return of(shape, std::span<const real>(values.begin(), values.size()));
   }
 
-  Tensor(const Tensor& other) noexcept;
-  Tensor(Tensor&& other) noexcept;
-  Tensor& operator=(Tensor other) noexcept;
-  ~Tensor();
-
-  bool defined() const { return buffer_ != nullptr; }
+  bool defined() const { return values_ != nullptr; }
   const Shape& shape() const { return shape_; }
   int rank() const { return shape_.rank(); }
   Dim dim(int i) const { return shape_[i]; }
-  Dim size() const { return size_; }
+  Dim size() const { return defined() ? size_ : 0; }
   /// Of its shape, "[4,16,16,32]"; "none" where it has no buffer.
   std::string text() const { return defined() ? shape_.text() : "none"; }
 
-  real* data() { return values_; }
-  const real* data() const { return values_; }
-  std::span<real> values() { return {values_, static_cast<std::size_t>(size_)}; }
-  std::span<const real> values() const { return {values_, static_cast<std::size_t>(size_)}; }
+  real* data() { return values_.get(); }
+  const real* data() const { return values_.get(); }
+  std::span<real> values() { return {data(), static_cast<std::size_t>(size())}; }
+  std::span<const real> values() const { return {data(), static_cast<std::size_t>(size())}; }
 
   /// The only deep copy.
   Tensor clone() const;
@@ -96,14 +91,7 @@ class Tensor {
   real item() const;
 
  private:
-  struct Buffer {
-    std::atomic<std::int32_t> users;
-    std::size_t bytes;
-  };
-
-  void swap(Tensor& other) noexcept;
-  Buffer* buffer_ = nullptr;
-  real* values_ = nullptr;
+  std::shared_ptr<real> values_;  // from the pool, aligned for vectors
   Dim size_ = 0;
   Shape shape_;
 };

@@ -11,14 +11,13 @@
 #include <omp.h>
 #include <sys/resource.h>
 
-#include <chrono>
-#include <ctime>
 #include <iostream>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <sstream>
 
-#include "data/windows/windows.h"
+#include "data/windows/random_passes.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/clock.h"
 #include "io/numbers/median.h"
@@ -83,33 +82,14 @@ double fma_gflops() {
   return operations / (seconds_of(CLOCK_THREAD_CPUTIME_ID) - begin) * 1e-9;
 }
 
-// A pass of 6,000 frames of a finger sliding over bumps.
-WindowSet sliding_bumps(const SuperTacSettings& model) {
+// Of a finger that slides over simulated plates.
+WindowSet simulated_windows(const SuperTacSettings& model) {
   WindowSettings settings;
   settings.timesteps = static_cast<int>(model.timesteps);
   settings.scale = static_cast<int>(model.scale);
   WindowSet windows(settings);
-  const Plate plate = Plate::named("3_Bumps");
-  Recording r;
-  r.plate = "3_Bumps";
-  r.trial = r.pass = 1;
-  r.speed_mm_s = 2.5;
-  r.source = "simulated";
-  for (int i = 0; i < 6000; ++i) {
-    const double time = i / 300.0, y = 28 + r.speed_mm_s * time;
-    r.time_s.push_back(time);
-    r.position_mm.insert(r.position_mm.end(), {18, static_cast<float>(y)});
-    for (int k = 0; k < rig::kTaxels; ++k)
-      r.signals.push_back(static_cast<float>(2.44 - 0.1 * plate.height(18, y - 4.5 + 3 * (k / 4))));
-  }
-  windows.add(r);
+  add_random_passes(windows, {.count = 50});
   return windows;
-}
-
-std::vector<std::uint32_t> all_of(const WindowSet& windows) {
-  std::vector<std::uint32_t> indices(windows.size());
-  for (std::uint32_t i = 0; i < windows.size(); ++i) indices[i] = i;
-  return indices;
 }
 
 class Ours {
@@ -179,12 +159,14 @@ class Ours {
   Trainer& trainer(int batch) {
     std::unique_ptr<Trainer>& trainer = trainers_[batch];
     if (!trainer) {
-      if (!data_) data_ = std::make_unique<WindowSet>(sliding_bumps(model_->settings()));
+      if (!data_) data_ = std::make_unique<WindowSet>(simulated_windows(model_->settings()));
       Recipe settings;
       settings.batch = batch;
       settings.model = model_->settings();
       settings.epochs = 100'000;
-      trainer = std::make_unique<Trainer>(*data_, all_of(*data_), Objective(*data_, settings));
+      std::vector<std::uint32_t> all(data_->size());
+      std::iota(all.begin(), all.end(), 0U);
+      trainer = std::make_unique<Trainer>(*data_, std::move(all), Objective(*data_, settings));
     }
     return *trainer;
   }
@@ -195,45 +177,41 @@ class Ours {
     return usage.ru_minflt + usage.ru_majflt;
   }
 
+  static double wall() { return seconds_of(CLOCK_MONOTONIC); }
+
   template <class Work>
   static std::string each(int count, const std::string& path, Work&& work) {
-    using Clock = std::chrono::steady_clock;
     std::vector<float> seconds(static_cast<std::size_t>(count), 1);  // the pages are there before
     for (int i = 0; i < 100; ++i) work();
     const long before = page_faults();
     for (float& one : seconds) {
-      const Clock::time_point begin = Clock::now();
+      const double begin = wall();
       work();
-      one = std::chrono::duration<float>(Clock::now() - begin).count();
+      one = static_cast<float>(wall() - begin);
     }
     const long faults = page_faults() - before;
     write_safetensors(path, {}, {{"seconds", "F32", {seconds.size()}, std::as_bytes(std::span(seconds))}});
     return std::to_string(faults);
   }
 
+  // Several calls a turn, so that each turn is long beside the resolution of the clocks.
   template <class Work>
   static std::string timed(double seconds, Work&& work) {
-    using Clock = std::chrono::steady_clock;
-    const auto process_seconds = [] { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; };
-    const auto since = [](Clock::time_point t) {
-      return std::chrono::duration<double>(Clock::now() - t).count();
-    };
     for (int i = 0; i < 3; ++i) work();
-    // clock() counts microseconds: several calls a turn.
-    Clock::time_point begin = Clock::now();
+    double begin = wall();
     work();
-    const int calls = std::max(1, static_cast<int>(1e-3 / since(begin)));
-    std::vector<double> cpu, wall, peak;
-    const Clock::time_point start = Clock::now();
-    while (since(start) < seconds || cpu.size() < 3) {
-      begin = Clock::now();
-      const double cpu_begin = process_seconds();
+    const int calls = std::max(1, static_cast<int>(1e-3 / (wall() - begin)));
+    std::vector<double> cpu, elapsed, peak;
+    const double end = wall() + seconds;
+    while (wall() < end || cpu.size() < 3) {
+      begin = wall();
+      const double cpu_begin = seconds_of(CLOCK_PROCESS_CPUTIME_ID);
       for (int i = 0; i < calls; ++i) work();
-      cpu.push_back((process_seconds() - cpu_begin) / calls);
-      wall.push_back(since(begin) / calls);
+      cpu.push_back((seconds_of(CLOCK_PROCESS_CPUTIME_ID) - cpu_begin) / calls);
+      elapsed.push_back((wall() - begin) / calls);
       peak.push_back(fma_gflops());
     }
-    return format(median(cpu)) + " " + format(median(wall)) + " " + format(median(peak));
+    return format(median(cpu)) + " " + format(median(elapsed)) + " " + format(median(peak));
   }
 
   std::unique_ptr<SuperTac> model_;

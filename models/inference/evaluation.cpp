@@ -11,14 +11,8 @@ namespace {
 
 constexpr std::size_t kBatchesAtOnce = 4;
 
-struct Part {
-  std::size_t first;
-  Tensor inputs, outputs, targets;
-  std::vector<float> predicted_errors;
-};
-
 void compute(const Ensemble& network, const WindowSet& data, std::span<const std::uint32_t> indices,
-             Part& part) {
+             EvaluatedBatch& part) {
   const std::size_t input_size = data.input_size(), target_size = data.image().pixels();
   for (std::size_t n = 0; n < indices.size(); ++n) {
     data.window(indices[n], part.inputs.values().subspan(n * input_size, input_size));
@@ -46,20 +40,19 @@ void for_each_output(const Ensemble& network, const WindowSet& data, std::span<c
                      const std::function<bool(const EvaluatedBatch&)>& use, std::size_t batch) {
   check_format(data, network.first());
   for (std::size_t start = 0; start < indices.size(); start += batch * kBatchesAtOnce) {
-    std::vector<Part> parts;
+    std::vector<EvaluatedBatch> parts;
     const std::size_t end = std::min(indices.size(), start + batch * kBatchesAtOnce);
     for (std::size_t first = start; first < end; first += batch) {
       const auto count = static_cast<Dim>(std::min(batch, end - first));
       const Shape pictures = network.first().picture_shape(count);
       parts.push_back(
-          {first, Tensor(network.first().input_shape(count)), Tensor(pictures), Tensor(pictures), {}});
+          {first, Tensor(network.first().input_shape(count)), Tensor(pictures), Tensor(pictures)});
     }
     parallel_for(parts.size(), [&](std::size_t i) {
-      const auto count = static_cast<std::size_t>(parts[i].inputs.dim(0));
-      compute(network, data, indices.subspan(parts[i].first, count), parts[i]);
+      compute(network, data, indices.subspan(parts[i].first, parts[i].size()), parts[i]);
     });
-    for (const Part& p : parts)
-      if (!use({p.first, p.inputs, p.outputs, p.targets, p.predicted_errors})) return;
+    for (const EvaluatedBatch& part : parts)
+      if (!use(part)) return;
   }
 }
 

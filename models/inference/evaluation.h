@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <vector>
 
 #include "data/scores/metrics.h"
 #include "data/windows/windows.h"
@@ -18,10 +19,8 @@ void check_format(const WindowSet& windows, const SuperTac& network);
 /// the first of their places in `indices`. Predicted errors are empty where the network has none.
 struct EvaluatedBatch {
   std::size_t first;
-  const Tensor& inputs;
-  const Tensor& outputs;
-  const Tensor& targets;
-  std::span<const float> predicted_errors;
+  Tensor inputs, outputs, targets;
+  std::vector<float> predicted_errors = {};
 
   std::size_t size() const { return static_cast<std::size_t>(inputs.dim(0)); }
   std::span<const float> input(std::size_t n) const { return sample(inputs.values(), n); }

@@ -17,6 +17,18 @@ void* pool_allocate(std::size_t bytes);
 /// Gives a block back; `bytes` is the number that was asked for.
 void pool_release(void* block, std::size_t bytes) noexcept;
 
+/// For containers and handles whose memory is to come from the pool.
+template <class T>
+struct PoolAllocator {
+  using value_type = T;
+  PoolAllocator() = default;
+  template <class U>
+  PoolAllocator(const PoolAllocator<U>&) {}
+  T* allocate(std::size_t count) { return static_cast<T*>(pool_allocate(count * sizeof(T))); }
+  void deallocate(T* block, std::size_t count) noexcept { pool_release(block, count * sizeof(T)); }
+  bool operator==(const PoolAllocator&) const = default;
+};
+
 /// Scratch memory of one function: an array of trivial values from the pool, contents undefined.
 template <class T>
 class Scratch {
