@@ -1,5 +1,5 @@
-// The loops of compiled models (inference.h), over the same vector type as kernels.inl and included
-// behind winograd.inl.
+// The loops of compiled models (inference.h), over the same vector type as kernels.inl and included behind
+// it.
 
 // The pixels of a job one after another.
 struct Cursor {

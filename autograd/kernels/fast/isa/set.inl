@@ -1,9 +1,10 @@
-// All loops of an instruction set over the vector type that its source defines (kernels.inl), and their
-// table.
+// All loops of an instruction set over the vector type that its source defines (kernels.inl, which the others
+// build on), and their table.
 
 #include "autograd/kernels/fast/isa/kernels.inl"
-#include "autograd/kernels/fast/isa/winograd.inl"
+
 #include "autograd/kernels/fast/isa/inference.inl"
+#include "autograd/kernels/fast/isa/winograd.inl"
 
 // A table is a constant of the program (constinit): no code of this instruction set may run before the
 // processor is known.
