@@ -18,72 +18,14 @@ bool is_rig(const Sensor& sensor) { return sensor.frame.kind == FrameKind::board
 
 }  // namespace
 
-FrameReader::FrameReader(const Sensor& sensor, bool stored)
-    : sensor_(sensor),
-      decoder_(make_decoder(sensor)),
-      clock_(clock_settings(sensor, stored)),
-      rest_(sensor) {}
-
-std::span<const ReadFrame> FrameReader::read(Port& port, double until, double& time_s) {
-  std::array<std::byte, 65536> buffer;  // no datagram is longer, and a terminal holds a sixteenth
-  const Received got = port.read(buffer, until);
-  const auto bytes = std::span(buffer).first(got.count);
-  for (const std::byte byte : bytes.first(std::min(bytes.size(), kShown - without_frame_.size())))
-    without_frame_ += std::to_integer<char>(byte);
-  if (decoder_->counters().frames == 0)
-    for (const std::byte byte : bytes) text_bytes_ += is_text(byte) ? 1 : 0;
-  return decode(bytes, time_s = got.time_s);
-}
-
-std::span<const ReadFrame> FrameReader::finish(double time_s) {
-  const std::byte end{'\n'};
-  const bool lines = sensor_.frame.kind == FrameKind::text || sensor_.frame.kind == FrameKind::json;
-  return decode({&end, lines ? 1U : 0U}, time_s);
-}
-
-std::span<const ReadFrame> FrameReader::decode(std::span<const std::byte> bytes, double time_s) {
-  arrivals_.clear();
-  decoder_->push(bytes, [&](const DecodedFrame& decoded) {
-    if (arrivals_.size() == frames_.size()) frames_.emplace_back().signals.resize(sensor_.array.signals());
-    ReadFrame& frame = frames_[arrivals_.size()];
-    sensor_.arrange(decoded.values, frame.signals);
-    if (!std::ranges::all_of(frame.signals, [](float v) { return std::isfinite(v); })) {
-      ++counters_.damaged, ++skipped_;
-      return;
-    }
-    frame.arrival = {time_s, decoded.damaged + std::exchange(skipped_, 0), decoded.time_s};
-    const bool paused = is_rig(sensor_) && !first_ && time_s - last_frame_s_ > 1.5 * rig::kFramePeriodS;
-    frame.suspect = decoded.suspect || paused, frame.jump = decoded.jump;
-    first_ = false, last_frame_s_ = time_s;
-    arrivals_.push_back(frame.arrival);
-  });
-  if (arrivals_.empty()) return {};
-  without_frame_.clear();
-  clock_.date(arrivals_, dates_);
-  for (std::size_t n = 0; n < dates_.size(); ++n) {
-    ReadFrame& frame = frames_[n];
-    frame.date = dates_[n];
-    counters_.suspect += frame.suspect ? 1 : 0, counters_.jumps += frame.jump ? 1 : 0;
-    rest_.follow(frame.date.time_s, frame.signals);
-  }
-  return std::span(frames_).first(dates_.size());
-}
-
-ReaderCounters FrameReader::counters() const {
-  ReaderCounters counters = counters_;
-  counters.decoder = decoder_->counters();
-  counters.missing = clock_.missing(), counters.resets = clock_.resets();
-  counters.period_s = clock_.period_s();
-  if (!is_rig(sensor_)) counters.suspect += counters.decoder.torn + counters.damaged;
-  return counters;
-}
-
 SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor, const ReaderSettings& settings)
     : port_(std::move(opened.port)),
       live_(opened.live),
       sensor_(sensor),
       silence_s_(settings.silence_s > 0 ? settings.silence_s : silence_s(sensor)),
-      frames_(sensor, opened.stored),
+      decoder_(make_decoder(sensor)),
+      clock_(clock_settings(sensor, opened.stored)),
+      rest_(sensor),
       last_frame_s_(port_->now()),
       most_(settings.queue_frames) {
   thread_ = std::thread([this] { run(); });
@@ -91,24 +33,23 @@ SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor, const Reader
 
 void SensorReader::run() {
   double time_s = last_frame_s_;
-  const auto read = [&](double until) {
-    take(frames_.read(*port_, until, time_s));
-    check_silence(time_s);
-  };
   try {
-    do read(port_->now() + kReadSlice);
+    do time_s = read(port_->now() + kReadSlice);
     while (!asked_to_stop());
     // What had arrived when the stop was asked for still counts. Where the machine is busy more comes with
     // every read: a port holds a tenth of a second at most.
     double now = port_->now();
     const double end = now + kReadSlice;
-    for (std::uint64_t before = ~std::uint64_t{0};
-         live_ && now < end && before != frames_.counters().decoder.bytes; now = port_->now()) {
-      before = frames_.counters().decoder.bytes;
-      read(now);
+    for (std::uint64_t before = ~std::uint64_t{0}; live_ && now < end && before != decoder_->counters().bytes;
+         now = port_->now()) {
+      before = decoder_->counters().bytes;
+      time_s = read(now);
     }
   } catch (const PortEnded&) {  // nothing is wrong, but with one that was to go on
-    take(frames_.finish(time_s));
+    // The last line may lack its end.
+    const std::byte end{'\n'};
+    const bool lines = sensor_.frame.kind == FrameKind::text || sensor_.frame.kind == FrameKind::json;
+    decode({&end, lines ? 1U : 0U}, time_s);
     const std::lock_guard lock(mutex_);
     if (live_)
       error_ = std::make_exception_ptr(PortUnplugged("sensor " + sensor_.name + " at " + port_->name() +
@@ -118,11 +59,80 @@ void SensorReader::run() {
     const std::lock_guard lock(mutex_);
     error_ = std::current_exception();
   }
-  frames_.close();
+  clock_.finish();
   const std::lock_guard lock(mutex_);
-  counters_ = frames_.counters();
+  counters_ = counted();
   ended_ = true;
   arrived_.notify_all();
+}
+
+double SensorReader::read(double until) {
+  std::array<std::byte, 65536> buffer;  // no datagram is longer, and a terminal holds a sixteenth
+  const Received got = port_->read(buffer, until);
+  const auto bytes = std::span(buffer).first(got.count);
+  for (const std::byte byte : bytes.first(std::min(bytes.size(), kShown - without_frame_.size())))
+    without_frame_ += std::to_integer<char>(byte);
+  if (decoder_->counters().frames == 0)
+    for (const std::byte byte : bytes) text_bytes_ += is_text(byte) ? 1 : 0;
+  decode(bytes, got.time_s);
+  check_silence(got.time_s);
+  return got.time_s;
+}
+
+void SensorReader::decode(std::span<const std::byte> bytes, double time_s) {
+  arrivals_.clear();
+  decoder_->push(bytes, [&](const DecodedFrame& decoded) {
+    if (arrivals_.size() == frames_.size()) frames_.emplace_back().signals.resize(sensor_.array.signals());
+    ReadFrame& frame = frames_[arrivals_.size()];
+    sensor_.arrange(decoded.values, frame.signals);
+    if (!std::ranges::all_of(frame.signals, [](float v) { return std::isfinite(v); })) {
+      ++read_.damaged, ++skipped_;
+      return;
+    }
+    frame.arrival = {time_s, decoded.damaged + std::exchange(skipped_, 0), decoded.time_s};
+    const bool paused =
+        is_rig(sensor_) && last_arrival_s_ && time_s - *last_arrival_s_ > 1.5 * rig::kFramePeriodS;
+    frame.suspect = decoded.suspect || paused, frame.jump = decoded.jump;
+    last_arrival_s_ = time_s;
+    arrivals_.push_back(frame.arrival);
+  });
+  if (!arrivals_.empty()) {
+    without_frame_.clear();
+    clock_.date(arrivals_, dates_);
+  }
+  for (std::size_t n = 0; n < arrivals_.size(); ++n) {
+    ReadFrame& frame = frames_[n];
+    frame.date = dates_[n];
+    read_.suspect += frame.suspect ? 1 : 0, read_.jumps += frame.jump ? 1 : 0;
+    rest_.follow(frame.date.time_s, frame.signals);
+  }
+  take(arrivals_.size());
+}
+
+void SensorReader::take(std::size_t count) {
+  std::unique_lock lock(mutex_);
+  counters_ = counted();
+  for (const ReadFrame& frame : std::span(frames_).first(count)) {
+    if (live_ && frame.arrival.stamp_s && !clock_checked_)
+      check_clock(*frame.arrival.stamp_s, frame.arrival.time_s);
+    if (!live_) {
+      taken_.wait(lock, [&] { return queue_.size() < most_ || stop_; });
+    } else if (queue_.size() >= most_) {
+      queue_.pop_front();
+      ++dropped_;
+    }
+    queue_.push_back(frame);
+    arrived_.notify_one();
+  }
+}
+
+ReaderCounters SensorReader::counted() const {
+  ReaderCounters counters = read_;
+  counters.decoder = decoder_->counters();
+  counters.missing = clock_.missing(), counters.resets = clock_.resets();
+  counters.period_s = clock_.period_s();
+  if (!is_rig(sensor_)) counters.suspect += counters.decoder.torn + counters.damaged;
+  return counters;
 }
 
 bool SensorReader::asked_to_stop() {
@@ -167,26 +177,27 @@ double SensorReader::silence_s(const Sensor& sensor) {
 }
 
 void SensorReader::check_silence(double time_s) {
-  const SensorDecoder::Counters counted = frames_.counters().decoder;
-  if (counted.frames != decoded_.frames) last_frame_s_ = time_s, decoded_ = counted;
+  const SensorDecoder::Counters total = decoder_->counters();
+  if (total.frames != decoded_.frames) last_frame_s_ = time_s, decoded_ = total;
   if (!live_ || time_s - last_frame_s_ < silence_s_) return;
-  const std::uint64_t bytes = counted.bytes - decoded_.bytes;
-  const bool never = counted.frames == 0;
+  const std::uint64_t bytes = total.bytes - decoded_.bytes;
+  const bool never = total.frames == 0;
   const std::string none =
       format(sensor_.rate_hz, 0) + " frames/s, found none for " + format(silence_s_, 1) + " s";
   if (is_rig(sensor_)) {
     if (never && bytes >= 2)
       throw WrongDevice(
           "port " + port_->name() + ": expected a tactile board, found " +
-          (frames_.text() ? "text, as from a printer; exchange the two ports"
-                          : std::to_string(bytes) +
-                                " bytes without a frame; choose the board's port (supertac-check machine)"));
+          (text_bytes_ > 0.9 * static_cast<double>(total.bytes)
+               ? "text, as from a printer; exchange the two ports"
+               : std::to_string(bytes) +
+                     " bytes without a frame; choose the board's port (supertac-check machine)"));
     throw BoardSilent("board " + port_->name() + ": expected " + none + "; " +
                       (never ? "is this the board's port (supertac-check machine)? If it is, " : "") +
                       "plug the board out and in again");
   }
   const std::string at = "sensor " + sensor_.name + " at " + port_->name() + ": expected ";
-  const std::string such = ", such as '" + printable(frames_.without_frame(), kShown) + "'; ";
+  const std::string such = ", such as '" + printable(without_frame_, kShown) + "'; ";
   if (never && bytes > 0)
     throw WrongDevice(at + "frames of " + std::to_string(sensor_.values()) + " values, found " +
                       std::to_string(bytes) + " bytes without one" + such +
@@ -215,23 +226,6 @@ void SensorReader::check_clock(double stamp_s, double arrival_s) {
   throw WrongDevice("sensor " + sensor_.name + " at " + port_->name() + ": its time stamps go " +
                     format(ratio, ratio < 1 ? 6 : 0) +
                     " s a second; see whether its file names the right column and unit (s, ms, us) of time");
-}
-
-void SensorReader::take(std::span<const ReadFrame> frames) {
-  std::unique_lock lock(mutex_);
-  counters_ = frames_.counters();
-  for (const ReadFrame& frame : frames) {
-    if (live_ && frame.arrival.stamp_s && !clock_checked_)
-      check_clock(*frame.arrival.stamp_s, frame.arrival.time_s);
-    if (!live_) {
-      taken_.wait(lock, [&] { return queue_.size() < most_ || stop_; });
-    } else if (queue_.size() >= most_) {
-      queue_.pop_front();
-      ++dropped_;
-    }
-    queue_.push_back(frame);
-    arrived_.notify_one();
-  }
 }
 
 ReaderCounters SensorReader::counters() {

@@ -42,39 +42,6 @@ struct ReaderCounters {
   double period_s = 0;  ///< from frame to frame, as they came
 };
 
-/// Reads a port, and decodes and dates what comes. It has no thread: the same reads give the same frames.
-class FrameReader {
- public:
-  /// `stored`: the frames are those of a file, whose arrivals say nothing.
-  explicit FrameReader(const Sensor& sensor, bool stored = false);
-  /// The frames that one read completes, until `until` at most, and when it was. Valid until the next.
-  std::span<const ReadFrame> read(Port& port, double until, double& time_s);
-  /// The last line of a source that has ended may lack its end.
-  std::span<const ReadFrame> finish(double time_s);
-  /// No more will come: what is lost at the end is counted.
-  void close() { clock_.finish(); }
-  ReaderCounters counters() const;
-  /// The first bytes of what came behind the newest frame, and whether nearly all of what came is text.
-  const std::string& without_frame() const { return without_frame_; }
-  bool text() const { return text_bytes_ > 0.9 * static_cast<double>(decoder_->counters().bytes); }
-
- private:
-  std::span<const ReadFrame> decode(std::span<const std::byte> bytes, double time_s);
-
-  Sensor sensor_;
-  std::unique_ptr<SensorDecoder> decoder_;
-  FrameClock clock_;
-  RestTracker rest_;
-  std::vector<ReadFrame> frames_;  // of one read, and room for those of a larger one
-  std::vector<FrameArrival> arrivals_;
-  std::vector<FrameDate> dates_;
-  double last_frame_s_ = 0, text_bytes_ = 0;
-  bool first_ = true;
-  std::uint32_t skipped_ = 0;  // frames since the one before that are not handed over
-  std::string without_frame_;
-  ReaderCounters counters_;
-};
-
 struct ReaderSettings {
   std::size_t queue_frames = 4096;
   double silence_s = 0;  ///< without a frame for so long: BoardSilent; 0: SensorReader::silence_s()
@@ -108,16 +75,31 @@ class SensorReader {
 
  private:
   void run();
+  /// Reads once, until `until` at most, and hands over the frames that it completes. Returns when it was.
+  double read(double until);
+  void decode(std::span<const std::byte> bytes, double time_s);
+  void take(std::size_t count);
+  ReaderCounters counted() const;
   bool asked_to_stop();
-  void take(std::span<const ReadFrame> frames);
   void check_silence(double time_s);
   void check_clock(double stamp_s, double arrival_s);
 
+  // Of the thread that reads: the same reads give the same frames.
   std::unique_ptr<Port> port_;
   bool live_;
   Sensor sensor_;
   double silence_s_;
-  FrameReader frames_;
+  std::unique_ptr<SensorDecoder> decoder_;
+  FrameClock clock_;
+  RestTracker rest_;
+  std::vector<ReadFrame> frames_;  // of one read, and room for those of a larger one
+  std::vector<FrameArrival> arrivals_;
+  std::vector<FrameDate> dates_;
+  ReaderCounters read_;                   // without what the decoder and the clock count
+  std::optional<double> last_arrival_s_;  // of a frame that was handed over
+  std::uint32_t skipped_ = 0;             // frames since then that were not
+  double text_bytes_ = 0;                 // of those before the first frame
+  std::string without_frame_;             // the first bytes of what came behind the newest frame
   double last_frame_s_;
   SensorDecoder::Counters decoded_;  // when the newest frame came
   double went_s_ = 0, first_arrival_s_ = 0, checked_time_s_ = 0, longest_step_s_ = 0;
