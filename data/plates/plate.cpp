@@ -218,12 +218,6 @@ Plate::Plate(std::string name, const std::vector<Texture>& textures) : name_(std
 Plate::Plate(std::string name, std::shared_ptr<const Surface> surface)
     : name_(std::move(name)), surface_(std::move(surface)) {}
 
-std::vector<std::string> rig_plates() {
-  std::vector<std::string> names;
-  for (const RigPlate& plate : kRigPlates) names.emplace_back(plate.name);
-  return names;
-}
-
 const std::vector<std::string>& default_plates() {
   static const std::vector<std::string> kNames = {"bumps12",  "bumps6",  "bumps4",
                                                   "ridges12", "ridges6", "ridges4"};

@@ -59,9 +59,7 @@ class Plate {
   std::vector<Texture> textures_ = {};
 };
 
-/// Names of the eight plates of the rig, and of the six that simulations use by default (the paper's bumps
-/// and ridges at 12, 6 and 4 mm).
-std::vector<std::string> rig_plates();
+/// Names of the six plates that simulations use by default: the paper's bumps and ridges at 12, 6 and 4 mm.
 const std::vector<std::string>& default_plates();
 
 /// The plate called "random<number>": what networks for unseen plates are trained and tested on

@@ -147,4 +147,11 @@ struct PrinterBench {
   Printer printer;
 };
 
+/// The same, and the head's place is known: rig::kMounted.
+struct ReadyBench : PrinterBench {
+  explicit ReadyBench(const RigSettings& settings = running_rig()) : PrinterBench(settings) {
+    printer.confirm_origin(rig::kMounted);
+  }
+};
+
 }  // namespace supertac

@@ -71,9 +71,6 @@ Recording short_recording() {
   return recording;
 }
 
-// Of this thread: other work of the machine is no reader's fault.
-double processor_seconds() { return seconds_of(CLOCK_THREAD_CPUTIME_ID); }
-
 }  // namespace
 
 Bytes good_recording(const std::string& folder) {
@@ -103,7 +100,8 @@ void judge_reading(const std::string& what, const std::function<void()>& read, C
     ++counts[kind];
     std::cerr << what << ": " << why << '\n';
   };
-  const double begin = processor_seconds();
+  // Of this thread: other work of the machine is no reader's fault.
+  const double begin = seconds_of(CLOCK_THREAD_CPUTIME_ID);
   try {
     read();
   } catch (const FileError&) {
@@ -115,7 +113,7 @@ void judge_reading(const std::string& what, const std::function<void()>& read, C
   } catch (const std::exception& error) {
     found("raw exceptions", error.what());
   }
-  const double took = processor_seconds() - begin;
+  const double took = seconds_of(CLOCK_THREAD_CPUTIME_ID) - begin;
   if (took > 0.1) found("slow mutants", std::to_string(took) + " s");
 }
 

@@ -2,6 +2,7 @@
 
 #include "data/plates/stl.h"
 #include "io/numbers/random.h"
+#include "tests/data/rig_plates.h"
 #include "tests/support/test.h"
 
 namespace supertac::plate_mesh_test {
@@ -76,7 +77,7 @@ TEST(PlateMesh, WrittenAndReadHeightsAgree) {
 }
 
 TEST(PlateMesh, RigPlatesComeBackExactlyAtTheNodes) {
-  for (const std::string& name : rig_plates()) {
+  for (const std::string name : kRigPlates) {
     const Plate plate = Plate::named(name);
     const Plate again = read(mesh_of(plate), name);
     EXPECT_NEAR(again.texture_begin(), plate.texture_begin(), 0.126) << name;

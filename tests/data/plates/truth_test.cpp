@@ -1,5 +1,6 @@
 #include "data/plates/truth.h"
 
+#include "tests/data/rig_plates.h"
 #include "tests/support/test.h"
 
 namespace supertac::truth_test {
@@ -37,7 +38,7 @@ TEST(Truth, IsZeroOnTheFlatPlateAndOneOnTopOfEveryPlate) {
   EXPECT_NEAR(truth_value(bumps, 5, 42), 1, 1e-12);
   EXPECT_EQ(truth_value(bumps, 5, 30), 0);
   for (double y = 20; y < 90; y += 0.77)
-    for (const auto& name : rig_plates()) {
+    for (const std::string name : kRigPlates) {
       const Plate plate = Plate::named(name);
       const double v = truth_value(plate, 7, y);
       EXPECT_GE(v, plate.min_height() < 0 ? -1 : 0) << name;

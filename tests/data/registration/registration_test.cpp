@@ -3,6 +3,7 @@
 #include "data/recordings/imports/text_import.h"
 #include "data/registration/pass_features.h"
 #include "tests/data/registration/lossy_pass.h"
+#include "tests/data/rig_plates.h"
 #include "tests/support/test.h"
 
 namespace supertac::registration_test {
@@ -41,7 +42,7 @@ constexpr double kWorstMm = 0.55;
 TEST(Registration, FindsEveryPlateWithoutBias) {
   double bias = 0;
   int n = 0;
-  for (const auto& plate : rig_plates())
+  for (const std::string plate : kRigPlates)
     for (const int pass : {1, 3, 6, 8}) {
       const Recording truth = like_the_rig(plate, pass, 7);
       const Registration r = register_pass(truth, Plate::named(plate));
@@ -223,7 +224,7 @@ TEST(Registration, RealPasses) {
   if (folder == nullptr) GTEST_SKIP() << "SUPERTAC_RECORDINGS is not set: real passes are not checked";
   int passes = 0, reliable = 0;
   double residual = 0;
-  for (const auto& name : rig_plates())
+  for (const std::string name : kRigPlates)
     for (int trial = 1; trial <= 2; ++trial)
       for (int pass = 1; pass <= (trial == 1 ? 8 : 4); ++pass) {
         ImportReport report;

@@ -127,8 +127,7 @@ TEST(MachineState, SoftEndstopsThatWouldCutThePlanAreNamed) {
 }
 
 TEST(MachineState, AKlipperThatStartsIsWaitedFor) {
-  PrinterBench bench(running_rig({.firmware = Firmware::klipper, .starts_s = 25}));
-  bench.printer.confirm_origin(rig::kMounted);
+  ReadyBench bench(running_rig({.firmware = Firmware::klipper, .starts_s = 25}));
   EXPECT_NEAR(bench.rig.now(), 1025, 3);
   SimulatedRig rig(running_rig({.firmware = Firmware::klipper, .starts_s = 1e6}));
   const auto port = rig.printer_port();
@@ -151,7 +150,6 @@ TEST(MachineState, TheCauseOfAShutdownIsQuoted) {
 struct Interrupted {
   explicit Interrupted(const VirtualPrinterSettings& firmware, std::function<void(PrinterBench&)> plant)
       : bench(running_rig(firmware)) {
-    bench.printer.confirm_origin(rig::kMounted);
     PalpationObserver observer;
     observer.position = [this, plant = std::move(plant)](const Leg& leg, const PositionSample& sample) {
       if (leg.phase != Phase::slide || sample.position.y < 120 || planted_s > 0) return;
@@ -160,7 +158,7 @@ struct Interrupted {
     };
     outcome = Palpation(bench.printer, {.passes = 2}, observer).run();
   }
-  PrinterBench bench;
+  ReadyBench bench;
   double planted_s = 0;
   PalpationOutcome outcome;
 };
@@ -210,8 +208,7 @@ TEST(MachineState, AHeatersErrorEndsARunOnlyWhereTheMachineHalts) {
 }
 
 TEST(MachineState, AQuoteIsMatchedWhereItStands) {
-  PrinterBench bench;
-  bench.printer.confirm_origin(rig::kMounted);
+  ReadyBench bench;
   bench.port.from_printer = {{"ok\n", "echo:Unknown command: \"1813\"M0114 R\"\nok\n"}};
   EXPECT_NO_THROW(bench.printer.link().command("M114 R"));
   EXPECT_GT(bench.printer.link().counters().faults, 0U);

@@ -10,10 +10,8 @@ namespace supertac::palpation_test {
 
 using rig::kMounted;
 
-struct PalpationBench : PrinterBench {
-  explicit PalpationBench(const RigSettings& settings = running_rig()) : PrinterBench(settings) {
-    printer.confirm_origin(kMounted);
-  }
+struct PalpationBench : ReadyBench {
+  using ReadyBench::ReadyBench;
   PalpationOutcome run(PalpationPlan plan, PalpationObserver observer = {}) {
     return Palpation(printer, plan, std::move(observer)).run();
   }
