@@ -125,10 +125,8 @@ class Tampering : public WrappedPort {
 
 /// Motion commands among those that ran.
 inline std::vector<std::string> moves_of(const VirtualPrinter& printer) {
-  std::vector<std::string> moves;
-  for (const auto& executed : printer.executed()) {
-    if (executed.command.starts_with("G1")) moves.push_back(executed.command);
-  }
+  std::vector<std::string> moves = printer.executed();
+  std::erase_if(moves, [](const std::string& command) { return !command.starts_with("G1"); });
   return moves;
 }
 

@@ -97,6 +97,11 @@ struct CarriedSensor {
                             rig.printer_port(), settings);
   }
   Journal journal() const { return read_journal(settings.journal); }
+  /// Of a run that has to be complete: its first pass.
+  CollectedPass first_pass() {
+    EXPECT_TRUE(record().outcome.complete);
+    return collection_of(journal()).passes.at(0);
+  }
   /// How far (mm) the frames' positions are from where the head was in their middle, at most.
   double worst(const CollectedPass& pass) const {
     double worst = 0;
@@ -119,13 +124,11 @@ struct CarriedSensor {
 TEST(CarriedSensor, EveryFrameHasItsPositionWithAndWithoutTimeStamps) {
   for (const bool stamped : {true, false}) {
     CarriedSensor run(mat(stamped));
-    const RecorderReport report = run.record();
-    ASSERT_TRUE(report.outcome.complete) << report.outcome.note;
+    const CollectedPass pass = run.first_pass();
     const Collection collection = collection_of(run.journal());
     EXPECT_EQ(collection.sensor, mat(stamped));
     EXPECT_EQ(collection.bed, far_bed());
-    ASSERT_EQ(collection.passes.size(), 1U);
-    const CollectedPass& pass = collection.passes[0];
+    EXPECT_EQ(collection.passes.size(), 1U);
     EXPECT_TRUE(pass.complete);
     EXPECT_EQ(pass.doubt, "");
     EXPECT_EQ(pass.missing + pass.left_out, 0U);
@@ -140,9 +143,7 @@ TEST(CarriedSensor, EveryFrameHasItsPositionWithAndWithoutTimeStamps) {
 TEST(CarriedSensor, LostFramesAreCountedAndCostNoPosition) {
   for (const bool stamped : {true, false}) {
     CarriedSensor run(mat(stamped), running_rig({}, {.stall_rate = 0.001}));  // of 20 ms: two frames
-    ASSERT_TRUE(run.record().outcome.complete);
-    const Collection collection = collection_of(run.journal());
-    const CollectedPass& pass = collection.passes.at(0);
+    const CollectedPass pass = run.first_pass();
     EXPECT_GE(pass.missing, stamped ? 1U : 0U);
     // Without time stamps a loss shows a dozen frames later.
     EXPECT_LT(run.worst(pass), stamped ? 0.05 : pass.doubt.empty() ? 2 * kTrustedMm : 2);
@@ -155,9 +156,7 @@ TEST(CarriedSensor, AnotherRateThanItsFileSaysCostsNoPosition) {
       Sensor sensor = mat(stamped);
       sensor.rate_hz = rate_hz;
       CarriedSensor run(sensor);
-      ASSERT_TRUE(run.record().outcome.complete);
-      const Collection collection = collection_of(run.journal());
-      const CollectedPass& pass = collection.passes.at(0);
+      const CollectedPass pass = run.first_pass();
       EXPECT_EQ(pass.doubt, "") << rate_hz;
       EXPECT_EQ(pass.missing + pass.left_out, 0U) << rate_hz;
       EXPECT_LT(run.worst(pass), stamped ? 0.05 : kTrustedMm) << rate_hz;

@@ -90,8 +90,8 @@ TEST(Printer, HomesWithTheFingerUp) {
     const auto& executed = bench.firmware().executed();
     std::size_t lift = 0, home = 0;
     for (std::size_t i = 0; i < executed.size(); ++i) {
-      if (executed[i].command.starts_with("G1 Z10")) lift = i;
-      if (executed[i].command == "G28") home = i;
+      if (executed[i].starts_with("G1 Z10")) lift = i;
+      if (executed[i] == "G28") home = i;
     }
     EXPECT_GT(lift, 0U);
     EXPECT_LT(lift, home);

@@ -30,12 +30,12 @@ BoardFrame VirtualBoard::sample(const Point3& head, double t) {
 }
 
 std::vector<std::byte> VirtualBoard::make_frame(const Point3& head) {
-  const double middle = next_frame() - 0.5 * settings_.period_s;
+  const double middle = next_frame() - 0.5 * rig::kFramePeriodS;
   ++counters_.made;
   if (stalled_frames_ == 0 && dice_.hit(settings_.faults.stall_rate)) stalled_frames_ = kStallFrames;
   if (stalled_frames_ == 0 && dice_.hit(settings_.faults.freeze_rate)) {
     room_ = kHeldFrames - static_cast<int>(held_.size() / rig::kFrameBytes);
-    stalled_frames_ = static_cast<int>((0.3 + 1.7 * dice_.uniform()) / settings_.period_s);
+    stalled_frames_ = static_cast<int>((0.3 + 1.7 * dice_.uniform()) / rig::kFramePeriodS);
   }
   const bool stalled = stalled_frames_ > 0;
   const bool held = stalled && room_ > 0;
@@ -97,7 +97,7 @@ void RigWorld::advance(double t) {
   while (board_.next_frame() <= t) {
     const double end = board_.next_frame();
     if (chunk_s_ > 0 && chunk_due_ < end) hand_on(chunk_due_);
-    const double middle = std::max(now_, end - 0.5 * board_.period());
+    const double middle = std::max(now_, end - 0.5 * rig::kFramePeriodS);
     printer_.advance(middle);
     const Point3 head = printer_.head(middle);
     printer_.advance(end);

@@ -12,9 +12,8 @@
 namespace supertac {
 
 struct VirtualBoardSettings {
-  FingerSignals signals{};               ///< empty: all taxels at rest
-  double period_s = rig::kFramePeriodS;  ///< the board's own crystal
-  RigFaults faults{};                    ///< lost frames and stalls; bytes are the port's matter
+  FingerSignals signals{};  ///< empty: all taxels at rest
+  RigFaults faults{};       ///< lost frames and stalls; bytes are the port's matter
   std::uint64_t seed = 1;
 };
 
@@ -30,8 +29,7 @@ class VirtualBoard {
   VirtualBoard(const VirtualBoardSettings& settings, double t);
 
   /// End of the frame now being sampled.
-  double next_frame() const { return start_ + static_cast<double>(counters_.made + 1) * settings_.period_s; }
-  double period() const { return settings_.period_s; }
+  double next_frame() const { return start_ + static_cast<double>(counters_.made + 1) * rig::kFramePeriodS; }
   /// Finishes the frame that ends at next_frame(); `head` is where the finger was in its middle.
   /// Returns the bytes to send, empty when the frame vanished.
   std::vector<std::byte> make_frame(const Point3& head);

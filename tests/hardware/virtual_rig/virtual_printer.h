@@ -47,7 +47,6 @@ struct VirtualPrinterSettings {
   double auto_position_s = 0;  ///< M154 as an earlier host left it on a running firmware; 0: off
   bool deaf_to_m154 = false;   ///< these reports cannot be switched off
   double auto_temperature_s = 0;
-  double quick_stop_s = 1;     ///< for which M410 holds the firmware
   double start_delay_s = 0;    ///< from ok to a move's beginning; 0: what was measured, 0.107, Klipper 0.253
   double slowness = 1;         ///< moves take this many times as long: a starved board
   bool keepalive = true;       ///< echo:busy every 2 s
@@ -71,12 +70,6 @@ class FaultyMotion : public MotionQueue {
 
 class VirtualPrinter {
  public:
-  /// A command that ran: what it was and when. Tests prove by it that nothing runs twice.
-  struct Executed {
-    double time_s;
-    std::string command;
-  };
-
   /// Switched on at time t. `already_running`: booted long ago, no banner, line number 357.
   VirtualPrinter(const VirtualPrinterSettings& settings, double t, bool already_running = false);
 
@@ -111,11 +104,13 @@ class VirtualPrinter {
   /// Puts raw text into the reply stream.
   void inject(const std::string& text) { output_ += text; }
 
-  const std::vector<Executed>& executed() const { return executed_; }
+  /// The commands that ran, oldest first: tests prove by it that nothing runs twice.
+  const std::vector<std::string>& executed() const { return executed_; }
   std::int64_t last_line() const { return lines_.last; }
 
  private:
   static constexpr double kNever = std::numeric_limits<double>::infinity();
+  static constexpr double kStopHoldsS = 1;  // M410 the firmware
 
   void on_character(char c, double t);
   void watch_for_emergency(char c, double t);
@@ -160,7 +155,7 @@ class VirtualPrinter {
   std::string partial_;
   std::string emergency_;
   std::string output_;
-  std::vector<Executed> executed_;
+  std::vector<std::string> executed_;
   std::function<void(std::int64_t, const std::string&, double)> hook_;
   double now_;
   double boot_end_;

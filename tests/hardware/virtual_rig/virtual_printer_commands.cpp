@@ -50,7 +50,7 @@ void VirtualPrinter::run(const std::string& command, double t) {
 }
 
 void VirtualPrinter::run_g(int code, const std::string& command, double t) {
-  executed_.push_back({t, command});
+  executed_.push_back(command);
   if (code == 0 || code == 1) return move(command, t);
   if (code == 4)
     return block_until(std::max(t, motion_.end_time()) + parameter(command, "S").value_or(0) +
@@ -158,7 +158,7 @@ void VirtualPrinter::run_m(int code, const std::string& command, double t) {
   const bool only_marlin =
       code == 0 || code == 108 || code == 154 || code == 155 || code == 211 || code == 410;
   if (klipper() && only_marlin) return unknown(command);
-  executed_.push_back({t, command});
+  executed_.push_back(command);
   if (run_state(code, command)) return;
   if (code == 0) return pause(command, t);
   if (code == 112) return kill(t, "echo:M112 Shutdown\n");
@@ -174,7 +174,7 @@ void VirtualPrinter::run_m(int code, const std::string& command, double t) {
   }
   if (code == 410 && !settings_.emergency_parser) {  // else it has acted when it came
     motion_.stop(t);
-    return block_until(t + settings_.quick_stop_s, t);
+    return block_until(t + kStopHoldsS, t);
   }
   if (code == 105) {
     ok_text_ = " T:25.00 /0.00 B:25.00 /0.00 @:0 B@:0";
@@ -283,7 +283,7 @@ void VirtualPrinter::overheat(double t) {
 void VirtualPrinter::quick_stop(double t) {
   motion_.stop(t);
   if (!blocked_) repeat_after_block_ = true;
-  block_until(t + settings_.quick_stop_s, t);
+  block_until(t + kStopHoldsS, t);
 }
 
 }  // namespace supertac
