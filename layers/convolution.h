@@ -20,8 +20,19 @@ inline constexpr ConvLayerOptions kSameSize{.kernel = 3, .stride = 1, .padding =
 template <int kDimensions, bool kTransposed>
 class ConvLayer : public Module {
  public:
-  ConvLayer(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
-  Variable forward(const Variable& x, real negative_slope = kNoActivation) const;
+  ConvLayer(Dim in, Dim out, const ConvLayerOptions& o, Rng& rng) : options_(o) {
+    const Shape shape = kDimensions == 1 ? Shape{o.kernel, in, out} : Shape{o.kernel, o.kernel, in, out};
+    const Dim taps = kDimensions == 1 ? o.kernel : o.kernel * o.kernel;
+    const Dim fan_in = (kTransposed ? out : in) * taps;
+    weight_ = add_parameter("weight", uniform_fan_in(shape, fan_in, rng),
+                            kTransposed ? Layout::conv_transpose : Layout::conv);
+    bias_ = add_parameter("bias", uniform_fan_in({out}, fan_in, rng), Layout::plain);
+  }
+  Variable forward(const Variable& x, real negative_slope = kNoActivation) const {
+    constexpr auto op = kTransposed ? (kDimensions == 1 ? conv_transpose1d : conv_transpose2d)
+                                    : (kDimensions == 1 ? conv1d : conv2d);
+    return op(x, weight_, bias_, {options_.stride, options_.padding, negative_slope});
+  }
 
  private:
   ConvLayerOptions options_;

@@ -62,28 +62,6 @@ std::vector<Phase> phases_of(const Pairs& pairs, bool to_input, Dim height, Dim 
   return phases;
 }
 
-// The pixels of a map from (top, left) on, `side` each way; -1 outside.
-void add_pixels(const ConvSettings& map, Dim top, Dim left, Dim side, std::vector<std::int32_t>& pixels) {
-  for (Dim y = top; y < top + side; ++y) {
-    for (Dim x = left; x < left + side; ++x) {
-      const bool inside = y >= 0 && y < map.height && x >= 0 && x < map.width;
-      pixels.push_back(inside ? static_cast<std::int32_t>(y * map.width + x) : -1);
-    }
-  }
-}
-
-void add_tiles(const ConvSettings& s, Geometry& g) {
-  const ConvSettings three_by_three{
-      .height = s.height, .width = s.width, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1};
-  if (s != three_by_three || s.height % 4 != 0 || s.width % 4 != 0) return;
-  for (Dim y = 0; y < s.height; y += 4) {
-    for (Dim x = 0; x < s.width; x += 4) {
-      add_pixels(s, y, x, 4, g.squares);
-      add_pixels(s, y - 1, x - 1, 6, g.patches);
-    }
-  }
-}
-
 Geometry build(const ConvSettings& s) {
   const Pairs pairs = pairs_of(s);
   Geometry g;
@@ -102,7 +80,6 @@ Geometry build(const ConvSettings& s) {
       list.outputs.push_back(p.output);
     }
   }
-  add_tiles(s, g);
   return g;
 }
 

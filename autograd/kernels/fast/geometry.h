@@ -33,10 +33,6 @@ struct Geometry {
   std::vector<Phase> forward;   // outputs gather from inputs
   std::vector<Phase> backward;  // inputs gather from outputs: the gradient of x
   std::vector<TapPairs> pairs;  // [taps]: the gradient of w
-  /// Where 3x3 keeps the size of a map (stride 1, padding 1) whose sides are multiples of 4, the map as tiles
-  /// of 4x4 pixels:
-  std::vector<std::int32_t> squares;  // [tiles][4][4]: their pixels
-  std::vector<std::int32_t> patches;  // [tiles][6][6]: the pixels they depend on, or -1 in the padding
 };
 
 /// A convolution whose table has been looked up.

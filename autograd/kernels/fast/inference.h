@@ -28,17 +28,6 @@ struct ProductJob {
   real negative_slope = 1;
 };
 
-/// Tiles of square x square pixels of maps with a margin of one pixel, numbered through a batch from `first`
-/// on, `count` of them. Place (i, j) of the k-th of them is places[((square + 2) i + j) * step + k * channels
-/// + c].
-struct MapTileJob {
-  Dim tiles_down = 0, tiles_across = 0;
-  Strides map;
-  Dim channels = 0;  // a multiple of kTransformChannels
-  Dim square = 4;    // or 2
-  Dim first = 0, count = 0, step = 0;
-};
-
 /// For each place of Winograd's transform m[place, tile, :] = sum over cin of v[place, tile, cin] * u[place,
 /// cin, :], with v [places][tiles][cin], u [places][cin][cout], m [places][tiles][cout]. From one place of v
 /// and m to the next it is place_step() numbers.

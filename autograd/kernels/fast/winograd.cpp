@@ -13,14 +13,21 @@
 namespace supertac::kernels {
 namespace {
 
-constexpr Dim kPlaces = 36, kSquare = 16;
+constexpr Dim kPlaces = 36, kSide = 4;
 constexpr Dim kFewestImages = 4;    // that repay the transform of the weights
 constexpr Dim kFewestTiles = 4;     // of a map: 8x8, 4x16
 constexpr Dim kTilesPerStrip = 8;   // these stay in the first cache from transform to transform, ...
 constexpr Dim kTilesPerPiece = 64;  // ... these in the second while their weights' gradient is summed
 constexpr Dim kPadding = 16;        // between places of weights: powers of two apart they share cache lines
 
-Dim tiles_of(const ConvTask& s) { return static_cast<Dim>(s.geometry->squares.size()) / kSquare; }
+// Of a map; 0 unless 3x3 taps keep its size, whose sides are multiples of 4.
+Dim tiles_of(const ConvTask& s) {
+  const ConvSettings& c = s.geometry->conv;
+  const ConvSettings same{
+      .height = c.height, .width = c.width, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1};
+  return c == same && c.height % kSide == 0 && c.width % kSide == 0 ? c.height * c.width / (kSide * kSide)
+                                                                    : 0;
+}
 Dim place_of(const ConvTask& s) { return s.cin * s.cout + kPadding; }
 
 // The weights of the gradient: taps in reverse order, [3][3][cin][cout] -> [3][3][cout][cin].
@@ -32,26 +39,29 @@ Tensor turned(Dim cin, Dim cout, const real* w) {
   return out;
 }
 
-TileJob patches_of(const ConvTask& s, Dim first, Dim count) {
-  const Geometry& g = *s.geometry;
-  return {g.patches.data(), tiles_of(s), g.in_pixels, s.cin, first, count, place_step(count, s.cin)};
-}
-TileJob squares_of(const ConvTask& s, Dim first, Dim count) {
-  const Geometry& g = *s.geometry;
-  return {g.squares.data(), tiles_of(s), g.out_pixels, s.cout, first, count, place_step(count, s.cout)};
+// Of maps of so many channels.
+TileJob tiles(const ConvTask& s, Dim channels, Dim first, Dim count) {
+  const ConvSettings& c = s.geometry->conv;
+  return {.tiles_down = c.height / kSide,
+          .tiles_across = c.width / kSide,
+          .map = {c.height * c.width * channels, c.width * channels, channels},
+          .channels = channels,
+          .first = first,
+          .count = count,
+          .step = place_step(count, channels)};
 }
 
 // Of the places u of the weights.
 void filter(const ConvTask& s, const real* x, const Tensor& u, const real* bias, real negative_slope,
             Slot y) {
   const IsaKernels& isa = isa_kernels();
-  const Dim tiles = s.images * tiles_of(s), strip = std::min(kTilesPerStrip, tiles);
+  const Dim all = s.images * tiles_of(s), strip = std::min(kTilesPerStrip, all);
   Tensor v(Shape{kPlaces, place_step(strip, s.cin)}), m(Shape{kPlaces, place_step(strip, s.cout)});
-  for (Dim first = 0; first < tiles; first += strip) {
-    const Dim count = std::min(strip, tiles - first);
-    isa.patches(patches_of(s, first, count), x, v.data());
+  for (Dim first = 0; first < all; first += strip) {
+    const Dim count = std::min(strip, all - first);
+    isa.patches(tiles(s, s.cin, first, count), x, v.data());
     isa.places({kPlaces, count, s.cin, s.cout, place_of(s)}, v.data(), u.data(), m.data());
-    isa.squares(squares_of(s, first, count), m.data(), bias, y.into, negative_slope, y.data);
+    isa.squares(tiles(s, s.cout, first, count), m.data(), bias, y.into, negative_slope, y.data);
   }
 }
 
@@ -78,13 +88,13 @@ void winograd_grad_x(const ConvTask& s, const real* gy, const real* w, Slot gx) 
 // du[place] = sum over tiles of (B^T d B)^T (A gy A^T),   gw = or += G^T du G
 void winograd_grad_w(const ConvTask& s, const real* x, const real* gy, Slot gw) {
   const IsaKernels& isa = isa_kernels();
-  const Dim tiles = s.images * tiles_of(s), piece = std::min(kTilesPerPiece, tiles);
+  const Dim all = s.images * tiles_of(s), piece = std::min(kTilesPerPiece, all);
   Tensor v(Shape{kPlaces, place_step(piece, s.cin)}), m(Shape{kPlaces, place_step(piece, s.cout)});
   Tensor du(Shape{kPlaces, place_of(s)});
-  for (Dim first = 0; first < tiles; first += piece) {
-    const Dim count = std::min(piece, tiles - first);
-    isa.patches(patches_of(s, first, count), x, v.data());
-    isa.square_grads(squares_of(s, first, count), gy, m.data());
+  for (Dim first = 0; first < all; first += piece) {
+    const Dim count = std::min(piece, all - first);
+    isa.patches(tiles(s, s.cin, first, count), x, v.data());
+    isa.square_grads(tiles(s, s.cout, first, count), gy, m.data());
     for (Dim place = 0; place < kPlaces; ++place) {
       fast::linear_grad_w(count, s.cin, s.cout, v.data() + place * place_step(count, s.cin),
                           m.data() + place * place_step(count, s.cout),

@@ -25,7 +25,7 @@ struct Filters {
 };
 
 struct Winograd {
-  kernels::MapTileJob from, to;
+  kernels::TileJob from, to;
   Tensor bias;
   Dim place = 0;  // numbers from one place of u to the next
   real negative_slope = 1;
@@ -81,14 +81,14 @@ void Winograd::operator()(const Block& block) const {
   real* const v = block.scratch;
   real* const m = v + places(from.channels);
   for (Dim first = 0; first < tiles; first += kTilesAtOnce) {
-    kernels::MapTileJob in = from, out = to;
+    kernels::TileJob in = from, out = to;
     in.first = out.first = first;
     in.count = out.count = std::min(kTilesAtOnce, tiles - first);
     in.step = place_step(in.count, in.channels), out.step = place_step(out.count, out.channels);
-    set.map_patches(in, block.first_pixel(x) - x.line() - x.channels, v);
+    set.patches(in, block.first_pixel(x), v);
     for (const Filters& f : filters) {
       multiply(f, in.count, v, m);
-      set.map_squares(out, m, bias.data(), negative_slope, block.first_pixel(y) + f.y_offset);
+      set.squares(out, m, bias.data(), Into::overwrite, negative_slope, block.first_pixel(y) + f.y_offset);
     }
   }
 }
@@ -101,7 +101,7 @@ Dim square_of(const FeatureMap& x) { return x.height % 4 == 0 && x.width % 4 == 
 Winograd winograd_step(const TracedOp& op, const FeatureMap& x, const FeatureMap& y, kernels::Strides to) {
   constexpr Dim kPadding = 16;  // powers of two apart the places share cache lines
   const Dim square = square_of(x), down = x.height / square, across = x.width / square;
-  return {.from = {down, across, x.strides(), x.channels, square},
+  return {.from = {down, across, x.strides(), x.channels, square, true},
           .to = {down, across, to, y.channels, square},
           .bias = op.inputs[2].value().clone(),
           .place = x.channels * y.channels + kPadding,

@@ -34,12 +34,16 @@ struct OuterJob {
   Dim images = 0, in_pixels = 0, out_pixels = 0, cin = 0, cout = 0;
   Into into = Into::add;
 };
-/// Tiles of 4x4 outputs for Winograd's transforms (winograd.cpp), numbered through a batch from `first`
-/// on, `count` of them. Place (i, j) of the k-th of them is places[(6 i + j) * step + k * channels + c].
+/// Tiles of square x square pixels of maps for Winograd's transforms (winograd.cpp), numbered through a batch
+/// from `first` on, `count` of them. Place (i, j) of the k-th of them is places[((square + 2) i + j) * step +
+/// k
+/// * channels + c].
 struct TileJob {
-  const std::int32_t* pixels = nullptr;  // of one image: [tiles][36] of patches or [tiles][16] of squares
-  Dim tiles = 0, image_pixels = 0;       // of one image
-  Dim channels = 0;                      // a multiple of kTransformChannels
+  Dim tiles_down = 0, tiles_across = 0;  // of an image
+  Strides map;
+  Dim channels = 0;     // a multiple of kTransformChannels
+  Dim square = 4;       // or 2
+  bool margin = false;  // whether zeros lie around each image, else the kernels put them there
   Dim first = 0, count = 0, step = 0;
 };
 inline constexpr Dim kTransformChannels = 16;
@@ -52,7 +56,7 @@ inline constexpr Dim place_step(Dim tiles, Dim channels) { return tiles * channe
 struct FilterJob {
   Dim weights = 0;        // a multiple of kTransformChannels
   Dim step = 0;           // numbers from one place to the next, `weights` or more
-  Dim square = 4;         // pixels of an output tile each way: 4, or 2 (map_patches, map_squares)
+  Dim square = 4;         // pixels of an output tile each way: 4, or 2
   Into into = Into::add;  // of filter_grads
 };
 
@@ -70,23 +74,20 @@ struct IsaKernels {
   /// u = G g G^T, and g = or += G^T u G
   void (*filters)(const FilterJob& job, const real* g, real* u) = nullptr;
   void (*filter_grads)(const FilterJob& job, const real* u, real* g) = nullptr;
-  /// places = B^T d B of the patches d of x
+  /// places = B^T d B of the patches d of x, each a tile and the pixels around
   void (*patches)(const TileJob& job, const real* x, real* places) = nullptr;
   /// y = f(start + A^T m A) of the places m; start is the bias, y itself (Into::add) or, without a bias, 0
   void (*squares)(const TileJob& job, const real* places, const real* bias, Into into, real negative_slope,
                   real* y) = nullptr;
-  /// places = A g A^T of the squares g of gy
+  /// places = A g A^T of the squares g of gy, of 4x4
   void (*square_grads)(const TileJob& job, const real* gy, real* places) = nullptr;
 
   /// to[j * to_step + i] = from[i * from_step + j] for i < rows, j < columns
   void (*transpose)(Dim rows, Dim columns, const real* from, Dim from_step, real* to, Dim to_step) = nullptr;
 
-  // Of compiled models, see inference.h. `x` of patches and plane_conv begins with the margin.
+  // Of compiled models, see inference.h. `x` of plane_conv begins with the margin.
   void (*product)(const ProductJob& job, const real* x, real* y) = nullptr;
-  void (*map_patches)(const MapTileJob& job, const real* x, real* places) = nullptr;
   void (*places)(const PlacesJob& job, const real* v, const real* u, real* m) = nullptr;
-  void (*map_squares)(const MapTileJob& job, const real* places, const real* bias, real negative_slope,
-                      real* y) = nullptr;
   void (*gate)(const MapJob& job, const real* a, const real* x, const real* gates, real* y) = nullptr;
   void (*mean)(const MapJob& job, const real* x, real* means) = nullptr;
   void (*planes)(const PlaneJob& job, Dim x_line, const real* x, real* to) = nullptr;

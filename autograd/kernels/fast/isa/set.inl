@@ -9,7 +9,6 @@
 // A table is a constant of the program (constinit): no code of this instruction set may run before the
 // processor is known.
 constexpr IsaKernels set_of(std::string_view name, Vectors vectors) {
-  return {name,        vectors, gather,       gather_rows, outer,     filters,     filter_grads,
-          patches,     squares, square_grads, transpose,   product,   map_patches, places,
-          map_squares, gate,    mean,         planes,      plane_conv};
+  return {name,         vectors,   gather,  gather_rows, outer, filters, filter_grads, patches,   squares,
+          square_grads, transpose, product, places,      gate,  mean,    planes,       plane_conv};
 }

@@ -119,8 +119,8 @@ ALWAYS_INLINE void transform(Load load, Store store) {
 #define INLINED __attribute__((always_inline))
 
 // Calls body(tile, channel, places from there on) for each tile of a job by a vector of channels.
-template <class Job, class Places, class Body>
-ALWAYS_INLINE void for_each_tile(const Job& job, Places* places, Body body) {
+template <class Places, class Body>
+ALWAYS_INLINE void for_each_tile(const TileJob& job, Places* places, Body body) {
   for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
     for (Dim c = 0; c < job.channels; c += Vec::kLanes) body(tile, c, places + c);
   }
@@ -149,66 +149,65 @@ void filter_grads(const FilterJob& job, const real* u, real* g) {
         });
 }
 
-template <class Transform>
+struct TileCorner {
+  Dim image, row, column;
+};
+template <int kSquare>
+ALWAYS_INLINE TileCorner corner_of(const TileJob& job, Dim tile) {
+  const Dim tiles = job.tiles_down * job.tiles_across, within = tile % tiles;
+  return {tile / tiles, within / job.tiles_across * kSquare, within % job.tiles_across * kSquare};
+}
+
+// Transforms the pixels of each tile and those up to kReach around it, which are 0 beyond the map unless they
+// are there (kThere).
+template <class Transform, int kReach, bool kThere>
 inline void into_places(const TileJob& job, const real* x, real* places) {
-  constexpr int kSide = Transform::kIn;
+  constexpr int kSquare = Transform::kIn - 2 * kReach;
+  const Dim height = job.tiles_down * kSquare, width = job.tiles_across * kSquare;
   for_each_tile(job, places, [&](Dim tile, Dim c, real* to_place) INLINED {
-    const real* image = x + tile / job.tiles * job.image_pixels * job.channels + c;
-    const std::int32_t* pixels = job.pixels + tile % job.tiles * kSide * kSide;
+    const TileCorner at = corner_of<kSquare>(job, tile);
+    const real* image = x + at.image * job.map.image + c;
     transform<Transform>(
         [&](int i, int j) INLINED {
-          const std::int32_t pixel = pixels[kSide * i + j];
-          return Vec::load(pixel >= 0 ? image + pixel * job.channels : kZeros);
+          const Dim row = at.row - kReach + i, column = at.column - kReach + j;
+          const bool there = kThere || (row >= 0 && row < height && column >= 0 && column < width);
+          return Vec::load(there ? image + row * job.map.line + column * job.map.pixel : kZeros);
         },
         [&](int i, int j, Vec to) INLINED { to.store(to_place + (Transform::kOut * i + j) * job.step); });
   });
 }
 
-void patches(const TileJob& job, const real* x, real* places) { into_places<PatchTransform>(job, x, places); }
-
-void square_grads(const TileJob& job, const real* gy, real* places) {
-  into_places<SquareGradTransform>(job, gy, places);
+// x, gy and y point at the first pixel of the first map.
+void patches(const TileJob& job, const real* x, real* places) {
+  if (!job.margin) return into_places<PatchTransform, 1, false>(job, x, places);
+  job.square == 4 ? into_places<PatchTransform, 1, true>(job, x, places)
+                  : into_places<SmallPatchTransform, 1, true>(job, x, places);
 }
 
-void squares(const TileJob& job, const real* places, const real* bias, Into into, real negative_slope,
-             real* y) {
-  constexpr int kSide = SquareTransform::kOut;
+void square_grads(const TileJob& job, const real* gy, real* places) {
+  into_places<SquareGradTransform, 0, true>(job, gy, places);
+}
+
+template <class Transform>
+inline void squares_by(const TileJob& job, const real* places, const real* bias, Into into,
+                       real negative_slope, real* y) {
   for_each_tile(job, places, [&](Dim tile, Dim c, const real* place) INLINED {
-    real* image = y + tile / job.tiles * job.image_pixels * job.channels + c;
-    const std::int32_t* pixels = job.pixels + tile % job.tiles * kSide * kSide;
-    const Vec start = Vec::load((bias ? bias : kZeros) + c);
-    transform<SquareTransform>(
-        [&](int i, int j) INLINED { return Vec::load(place + (SquareTransform::kIn * i + j) * job.step); },
+    const TileCorner at = corner_of<Transform::kOut>(job, tile);
+    real* corner = y + at.image * job.map.image + at.row * job.map.line + at.column * job.map.pixel + c;
+    const Vec start = Vec::load(bias ? bias + c : kZeros);
+    transform<Transform>(
+        [&](int i, int j) INLINED { return Vec::load(place + (Transform::kIn * i + j) * job.step); },
         [&](int i, int j, Vec to) INLINED {
-          real* pixel = image + pixels[kSide * i + j] * job.channels;
+          real* pixel = corner + i * job.map.line + j * job.map.pixel;
           rectified(Vec::add(into == Into::add ? Vec::load(pixel) : start, to), negative_slope).store(pixel);
         });
   });
 }
 
-// The same for maps of compiled models (inference.h), which have margins, and their products.
-
-template <int kSquare>
-ALWAYS_INLINE Dim tile_corner(const MapTileJob& job, Dim tile) {
-  const Dim tiles = job.tiles_down * job.tiles_across, within = tile % tiles;
-  return tile / tiles * job.map.image + within / job.tiles_across * kSquare * job.map.line +
-         within % job.tiles_across * kSquare * job.map.pixel;
-}
-
-template <class Transform>
-inline void patches_by(const MapTileJob& job, const real* x, real* places) {
-  for_each_tile(job, places, [&](Dim tile, Dim c, real* to_place) INLINED {
-    const real* corner = x + tile_corner<Transform::kIn - 2>(job, tile) + c;
-    transform<Transform>(
-        [&](int i, int j) INLINED { return Vec::load(corner + i * job.map.line + j * job.map.pixel); },
-        [&](int i, int j, Vec to) INLINED { to.store(to_place + (Transform::kOut * i + j) * job.step); });
-  });
-}
-
-// x points at the margin's first pixel.
-void map_patches(const MapTileJob& job, const real* x, real* places) {
-  job.square == 4 ? patches_by<PatchTransform>(job, x, places)
-                  : patches_by<SmallPatchTransform>(job, x, places);
+void squares(const TileJob& job, const real* places, const real* bias, Into into, real negative_slope,
+             real* y) {
+  job.square == 4 ? squares_by<SquareTransform>(job, places, bias, into, negative_slope, y)
+                  : squares_by<SmallSquareTransform>(job, places, bias, into, negative_slope, y);
 }
 
 // P tiles by J vectors of outputs. The weights are met once for each strip of tiles: those of the next place
@@ -259,24 +258,4 @@ void places(const PlacesJob& job, const real* v, const real* u, real* m) {
     place_tiles<1>(job, tile, v, u, m);
     v += v_step, u += job.place, m += m_step;
   }
-}
-
-template <class Transform>
-inline void squares_by(const MapTileJob& job, const real* places, const real* bias, real negative_slope,
-                       real* y) {
-  for_each_tile(job, places, [&](Dim tile, Dim c, const real* place) INLINED {
-    real* corner = y + tile_corner<Transform::kOut>(job, tile) + c;
-    const Vec start = Vec::load(bias + c);
-    transform<Transform>(
-        [&](int i, int j) INLINED { return Vec::load(place + (Transform::kIn * i + j) * job.step); },
-        [&](int i, int j, Vec to) INLINED {
-          rectified(Vec::add(start, to), negative_slope).store(corner + i * job.map.line + j * job.map.pixel);
-        });
-  });
-}
-
-// y points at the map's first pixel.
-void map_squares(const MapTileJob& job, const real* places, const real* bias, real negative_slope, real* y) {
-  job.square == 4 ? squares_by<SquareTransform>(job, places, bias, negative_slope, y)
-                  : squares_by<SmallSquareTransform>(job, places, bias, negative_slope, y);
 }
