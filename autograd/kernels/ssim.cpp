@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 
-#include "autograd/kernels/fast/pool.h"
 #include "autograd/kernels/losses.h"
 
 namespace supertac::kernels {
@@ -46,7 +45,7 @@ class SsimImage {
         wd_(width),
         oh_(height - w_.size + 1),
         ow_(width - w_.size + 1),
-        store_(static_cast<std::size_t>(kMaps * height * width)) {}
+        store_(Shape{kMaps * height * width}) {}
 
   // The mean over positions.
   double value(const real* x, const real* target) {
@@ -169,7 +168,7 @@ class SsimImage {
 
   Window w_;
   Dim h_, wd_, oh_, ow_;
-  Scratch<real> store_;
+  Tensor store_;
   real *const a_ = map(0), *const b_ = map(1);  // [h,w]: the two images less their means
   real centre_a_ = 0, centre_b_ = 0;
   real *const mean_a_ = map(2), *const mean_b_ = map(3), *const aa_ = map(4), *const bb_ = map(5),

@@ -9,7 +9,6 @@
 
 #include "autograd/kernels/conv.h"
 #include "autograd/kernels/fast/each.h"
-#include "autograd/kernels/fast/pool.h"
 #include "autograd/record.h"
 
 namespace supertac {
@@ -135,7 +134,7 @@ void orthogonalise(Dim rows, Dim columns, real* x) {
   const Dim size = rows * columns, side = std::min(rows, columns), square = side * side;
   const bool wide = rows <= columns;
   constexpr real kA = real(3.4445), kB = real(-4.7750), kC = real(2.0315);
-  Scratch<real> start(static_cast<std::size_t>(size)), squares(static_cast<std::size_t>(5 * square));
+  Tensor start(Shape{size}), squares(Shape{5 * square});
   real* const from = start.data();
   real *s = squares.data(), *p = s + square, *q = p + square, *next = q + square, *spare = next + square;
   const auto factor = static_cast<real>(1 / (std::sqrt(sum_of_squares(size, x)) + 1e-7));
@@ -180,7 +179,7 @@ bool is_matrix(const Shape& shape) {
 static void move_matrix(const Shape& shape, real clip, double rate, const real* gradient, real* x, real* m) {
   constexpr real kMomentum = real(0.95), kRest = real(0.05);
   const Dim n = shape.elements(), columns = shape[shape.rank() - 1], rows = n / columns;
-  Scratch<real> direction(static_cast<std::size_t>(n));
+  Tensor direction(Shape{n});
   real* to = direction.data();
   kernels::each(n, [=](Dim i) {
     const real g = clip * gradient[i], moment = flushed(kMomentum * m[i] + kRest * g);

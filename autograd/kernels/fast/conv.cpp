@@ -12,8 +12,6 @@ void gather_batch(const GatherJob& job, Dim images, Dim in_pixels, Dim out_pixel
   for (Dim n = 0; n < images; ++n) gather(job, x + n * in_pixels * job.cin, y + n * out_pixels * job.cout);
 }
 
-ConvTask task_of(const ConvSizes& s) { return {&geometry_of(s.conv), s.images, s.cin, s.cout}; }
-
 }  // namespace
 
 Tensor transposed_weights(const real* weights, Dim taps, Dim cin, Dim cout) {
@@ -23,41 +21,38 @@ Tensor transposed_weights(const real* weights, Dim taps, Dim cin, Dim cout) {
   return transposed;
 }
 
-void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real negative_slope,
-          real* y) {
-  const ConvTask s = task_of(sizes);
+void conv(const ConvSizes& s, const real* x, const real* w, const real* bias, real negative_slope, real* y) {
   if (is_narrow(s)) return narrow_conv(s, x, w, bias, negative_slope, y);
   if (is_winograd(s)) return winograd_conv(s, x, w, bias, negative_slope, y);
-  const GatherJob job{&s.geometry->forward, w, bias, s.cin, s.cout, Into::overwrite, negative_slope};
-  gather_batch(job, s.images, s.geometry->in_pixels, s.geometry->out_pixels, x, y);
+  const GatherJob job{&geometry_of(s.conv).forward, w, bias, s.cin, s.cout, Into::overwrite, negative_slope};
+  gather_batch(job, s.images, s.in_pixels(), s.out_pixels(), x, y);
 }
 
-void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Slot gx) {
-  const ConvTask s = task_of(sizes);
+void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, Slot gx) {
   if (is_narrow(s)) return narrow_grad_x(s, gy, w, gx);
   if (is_winograd(s)) return winograd_grad_x(s, gy, w, gx);
-  const Tensor wt = transposed_weights(w, s.geometry->taps, s.cin, s.cout);
-  const GatherJob job{&s.geometry->backward, wt.data(), nullptr, s.cout, s.cin, gx.into, 1};
-  gather_batch(job, s.images, s.geometry->out_pixels, s.geometry->in_pixels, gy, gx.data);
+  const Tensor wt = transposed_weights(w, s.conv.taps(), s.cin, s.cout);
+  const GatherJob job{&geometry_of(s.conv).backward, wt.data(), nullptr, s.cout, s.cin, gx.into, 1};
+  gather_batch(job, s.images, s.out_pixels(), s.in_pixels(), gy, gx.data);
 }
 
 // A chunk of images passes all taps before the next one, while it is in the cache.
-void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Slot gw) {
-  const ConvTask s = task_of(sizes);
-  if (s.images == 0) gw.begin(sizes.conv.taps() * s.cin * s.cout);
+void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, Slot gw) {
+  if (s.images == 0) gw.begin(s.conv.taps() * s.cin * s.cout);
   if (is_narrow(s)) return narrow_grad_w(s, x, gy, gw);
   if (is_winograd(s)) return winograd_grad_w(s, x, gy, gw);
   const auto outer = isa_kernels().outer;
-  const Geometry& g = *s.geometry;
-  const Dim chunk = std::max<Dim>(1, kRowsPerPiece / g.out_pixels);
+  const Geometry& g = geometry_of(s.conv);
+  const Dim in_pixels = s.in_pixels(), out_pixels = s.out_pixels();
+  const Dim chunk = std::max<Dim>(1, kRowsPerPiece / out_pixels);
   for (Dim n = 0; n < s.images; n += chunk) {
     OuterJob job{nullptr,
-                 x + n * g.in_pixels * s.cin,
-                 gy + n * g.out_pixels * s.cout,
+                 x + n * in_pixels * s.cin,
+                 gy + n * out_pixels * s.cout,
                  gw.data,
                  std::min(chunk, s.images - n),
-                 g.in_pixels,
-                 g.out_pixels,
+                 in_pixels,
+                 out_pixels,
                  s.cin,
                  s.cout,
                  n == 0 ? gw.into : Into::add};

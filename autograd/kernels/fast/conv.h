@@ -29,22 +29,22 @@ namespace supertac::kernels {
 /// Whether conv() and its gradients take this way: fewer than half as many outputs as inputs, taps * outputs
 /// that fit a vector of 16, and kernels three wide and an odd number high that keep the size of a map. The
 /// shapes alone decide, so that all processors agree.
-bool is_narrow(const ConvTask& task);
+bool is_narrow(const ConvSizes& sizes);
 
-void narrow_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,
+void narrow_conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real negative_slope,
                  real* y);
-void narrow_grad_x(const ConvTask& task, const real* gy, const real* w, Slot gx);
-void narrow_grad_w(const ConvTask& task, const real* x, const real* gy, Slot gw);
+void narrow_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Slot gx);
+void narrow_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Slot gw);
 
 // In winograd.cpp:
 /// Whether conv() and its gradients take this way: four images or more, of four 4x4 squares or more (8x8,
 /// 4x16), channels multiples of 16. Elsewhere the transforms cost more than the products save. The shapes
 /// alone decide, so that all processors agree.
-bool is_winograd(const ConvTask& task);
+bool is_winograd(const ConvSizes& sizes);
 
-void winograd_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,
-                   real* y);
-void winograd_grad_x(const ConvTask& task, const real* gy, const real* w, Slot gx);
-void winograd_grad_w(const ConvTask& task, const real* x, const real* gy, Slot gw);
+void winograd_conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias,
+                   real negative_slope, real* y);
+void winograd_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Slot gx);
+void winograd_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Slot gw);
 
 }  // namespace supertac::kernels

@@ -65,10 +65,6 @@ std::vector<Phase> phases_of(const Pairs& pairs, bool to_input, Dim height, Dim 
 Geometry build(const ConvSettings& s) {
   const Pairs pairs = pairs_of(s);
   Geometry g;
-  g.conv = s;
-  g.in_pixels = s.height * s.width;
-  g.out_pixels = s.out_height() * s.out_width();
-  g.taps = s.taps();
   const Dim up_h = s.transposed ? s.stride_h : 1, up_w = s.transposed ? s.stride_w : 1;
   const Dim down_h = s.transposed ? 1 : s.stride_h, down_w = s.transposed ? 1 : s.stride_w;
   g.forward = phases_of(pairs, false, s.out_height(), s.out_width(), up_h, up_w);

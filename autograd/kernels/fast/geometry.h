@@ -28,17 +28,9 @@ struct TapPairs {
 };
 
 struct Geometry {
-  ConvSettings conv;
-  Dim in_pixels = 0, out_pixels = 0, taps = 0;
   std::vector<Phase> forward;   // outputs gather from inputs
   std::vector<Phase> backward;  // inputs gather from outputs: the gradient of x
   std::vector<TapPairs> pairs;  // [taps]: the gradient of w
-};
-
-/// A convolution whose table has been looked up.
-struct ConvTask {
-  const Geometry* geometry;
-  Dim images, cin, cout;
 };
 
 /// The table of these settings, built at first use and kept. Any thread may call it.

@@ -24,16 +24,15 @@ constexpr Dim kAcross = 3, kMostOutputs = kColumns / kAcross;  // taps of a line
 constexpr Dim kPart = 4;
 constexpr Dim filled_up(Dim n) { return (n + kPart - 1) / kPart * kPart; }
 
-Dim pixels_of(const ConvTask& s) { return s.geometry->in_pixels; }
-Dim sums_of(const ConvTask& s) { return s.geometry->taps * s.cout; }
+Dim sums_of(const ConvSizes& s) { return s.conv.taps() * s.cout; }
 // Of a map with its margin.
-Dim lines_of(const ConvTask& s) { return s.geometry->conv.height + s.geometry->conv.kernel_h - 1; }
-Dim line_of(const ConvTask& s) { return s.geometry->conv.width + kAcross - 1; }
+Dim lines_of(const ConvSizes& s) { return s.conv.height + s.conv.kernel_h - 1; }
+Dim line_of(const ConvSizes& s) { return s.conv.width + kAcross - 1; }
 
 // [taps][cin][cout] -> [cin][(taps, cout), zeros]
-Tensor with_taps_inside(const ConvTask& s, const real* w) {
+Tensor with_taps_inside(const ConvSizes& s, const real* w) {
   Tensor out = Tensor::zeros({s.cin, kColumns});
-  for (Dim t = 0; t < s.geometry->taps; ++t) {
+  for (Dim t = 0; t < s.conv.taps(); ++t) {
     for (Dim i = 0; i < s.cin; ++i) {
       for (Dim o = 0; o < s.cout; ++o) out.data()[i * kColumns + t * s.cout + o] = *w++;
     }
@@ -44,10 +43,9 @@ Tensor with_taps_inside(const ConvTask& s, const real* w) {
 // to[p, t, o] = gy[p - t, o], 0 outside the map, for one image. Of `turned`, the map by half a turn with a
 // margin of zeros, the taps of a line lie side by side.
 template <Dim kOutputs>
-void expanded(const ConvTask& s, const real* gy, real* turned, real* to) {
+void expanded(const ConvSizes& s, const real* gy, real* turned, real* to) {
   constexpr Dim kRun = kAcross * kOutputs;
-  const Dim width = s.geometry->conv.width, height = s.geometry->conv.height,
-            taps_down = s.geometry->conv.kernel_h;
+  const Dim width = s.conv.width, height = s.conv.height, taps_down = s.conv.kernel_h;
   const Dim line = line_of(s) * kOutputs;
   real* inside = turned + (height - 1 + taps_down / 2) * line + width * kOutputs;
   for (Dim i = 0; i < height; ++i, inside -= line) {
@@ -66,8 +64,8 @@ void expanded(const ConvTask& s, const real* gy, real* turned, real* to) {
 
 // y[q, o] = bias[o] + sum over taps of z[q + t, t, o] for one image; z has a margin of zeros.
 template <Dim kOutputs>
-void collect(const ConvTask& s, const real* z, const real* bias, real* y) {
-  const ConvSettings& c = s.geometry->conv;
+void collect(const ConvSizes& s, const real* z, const real* bias, real* y) {
+  const ConvSettings& c = s.conv;
   for (Dim i = 0; i < c.height; ++i, y += c.width * kOutputs) {
     for (Dim j = 0; j < c.width * kOutputs; ++j) y[j] = bias != nullptr ? bias[j % kOutputs] : 0;
     for (Dim k = 0; k < c.kernel_h; ++k) {
@@ -94,13 +92,13 @@ void with_outputs(Dim outputs, Use use) {
 }
 
 // Of all images.
-Tensor expanded(const ConvTask& s, const real* gy) {
+Tensor expanded(const ConvSizes& s, const real* gy) {
   Tensor turned = Tensor::zeros({lines_of(s) * line_of(s) * s.cout + kPart});
-  Tensor gz(Shape{s.images * pixels_of(s) * sums_of(s) + kPart});
+  Tensor gz(Shape{s.images * s.in_pixels() * sums_of(s) + kPart});
   with_outputs(s.cout, [&](auto outputs) {
     for (Dim n = 0; n < s.images; ++n) {
-      expanded<outputs>(s, gy + n * pixels_of(s) * outputs, turned.data(),
-                        gz.data() + n * pixels_of(s) * sums_of(s));
+      expanded<outputs>(s, gy + n * s.in_pixels() * outputs, turned.data(),
+                        gz.data() + n * s.in_pixels() * sums_of(s));
     }
   });
   return gz;
@@ -108,16 +106,16 @@ Tensor expanded(const ConvTask& s, const real* gy) {
 
 }  // namespace
 
-bool is_narrow(const ConvTask& s) {
-  const ConvSettings& c = s.geometry->conv;
+bool is_narrow(const ConvSizes& s) {
+  const ConvSettings& c = s.conv;
   ConvSettings same{.height = c.height, .width = c.width, .kernel_h = c.kernel_h, .kernel_w = kAcross};
   same.padding_h = c.kernel_h / 2, same.padding_w = kAcross / 2;
   return c == same && c.kernel_h % 2 == 1 && sums_of(s) <= kColumns && s.cout * 2 < s.cin;
 }
 
-void narrow_conv(const ConvTask& s, const real* x, const real* w, const real* bias, real negative_slope,
+void narrow_conv(const ConvSizes& s, const real* x, const real* w, const real* bias, real negative_slope,
                  real* y) {
-  const ConvSettings& c = s.geometry->conv;
+  const ConvSettings& c = s.conv;
   const Tensor inside = with_taps_inside(s, w);
   const Dim line = line_of(s) * kColumns, pixel_itself = 0;
   Tensor z = Tensor::zeros({lines_of(s), line});
@@ -131,26 +129,26 @@ void narrow_conv(const ConvTask& s, const real* x, const real* w, const real* bi
                        .w = inside.data(),
                        .cout = kColumns};
   for (Dim n = 0; n < s.images; ++n) {
-    isa_kernels().product(job, x + n * pixels_of(s) * s.cin,
+    isa_kernels().product(job, x + n * s.in_pixels() * s.cin,
                           z.data() + c.padding_h * line + c.padding_w * kColumns);
     with_outputs(s.cout,
-                 [&](auto outputs) { collect<outputs>(s, z.data(), bias, y + n * pixels_of(s) * outputs); });
+                 [&](auto outputs) { collect<outputs>(s, z.data(), bias, y + n * s.in_pixels() * outputs); });
   }
   if (negative_slope != 1)
-    std::transform(y, y + s.images * pixels_of(s) * s.cout, y, Rectifier(negative_slope));
+    std::transform(y, y + s.images * s.in_pixels() * s.cout, y, Rectifier(negative_slope));
 }
 
-void narrow_grad_x(const ConvTask& s, const real* gy, const real* w, Slot gx) {
-  const Tensor wt = fast::transposed_weights(w, s.geometry->taps, s.cin, s.cout);
+void narrow_grad_x(const ConvSizes& s, const real* gy, const real* w, Slot gx) {
+  const Tensor wt = fast::transposed_weights(w, s.conv.taps(), s.cin, s.cout);
   isa_kernels().gather_rows({nullptr, wt.data(), nullptr, sums_of(s), s.cin, gx.into, 1},
-                            expanded(s, gy).data(), gx.data, s.images * pixels_of(s));
+                            expanded(s, gy).data(), gx.data, s.images * s.in_pixels());
 }
 
-void narrow_grad_w(const ConvTask& s, const real* x, const real* gy, Slot gw) {
+void narrow_grad_w(const ConvSizes& s, const real* x, const real* gy, Slot gw) {
   Tensor inside(Shape{sums_of(s), s.cin});
-  fast::linear_grad_w(s.images * pixels_of(s), sums_of(s), s.cin, expanded(s, gy).data(), x,
+  fast::linear_grad_w(s.images * s.in_pixels(), sums_of(s), s.cin, expanded(s, gy).data(), x,
                       {inside.data(), Into::overwrite});
-  for (Dim t = 0; t < s.geometry->taps; ++t) {
+  for (Dim t = 0; t < s.conv.taps(); ++t) {
     for (Dim i = 0; i < s.cin; ++i) {
       for (Dim o = 0; o < s.cout; ++o, ++gw.data) {
         const real sum = inside.data()[(t * s.cout + o) * s.cin + i];

@@ -17,7 +17,8 @@ void* pool_allocate(std::size_t bytes);
 /// Gives a block back; `bytes` is the number that was asked for.
 void pool_release(void* block, std::size_t bytes) noexcept;
 
-/// For containers and handles whose memory is to come from the pool.
+/// For containers and handles whose memory is to come from the pool. Scratch memory of a function is a
+/// Tensor.
 template <class T>
 struct PoolAllocator {
   using value_type = T;
@@ -27,23 +28,6 @@ struct PoolAllocator {
   T* allocate(std::size_t count) { return static_cast<T*>(pool_allocate(count * sizeof(T))); }
   void deallocate(T* block, std::size_t count) noexcept { pool_release(block, count * sizeof(T)); }
   bool operator==(const PoolAllocator&) const = default;
-};
-
-/// Scratch memory of one function: an array of trivial values from the pool, contents undefined.
-template <class T>
-class Scratch {
- public:
-  explicit Scratch(std::size_t count)
-      : count_(count), data_(static_cast<T*>(pool_allocate(count * sizeof(T)))) {}
-  ~Scratch() { pool_release(data_, count_ * sizeof(T)); }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  T* data() { return data_; }
-  T& operator[](std::size_t i) { return data_[i]; }
-
- private:
-  std::size_t count_;
-  T* data_;
 };
 
 }  // namespace supertac

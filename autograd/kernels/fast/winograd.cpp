@@ -21,14 +21,14 @@ constexpr Dim kTilesPerPiece = 64;  // ... these in the second while their weigh
 constexpr Dim kPadding = 16;        // between places of weights: powers of two apart they share cache lines
 
 // Of a map; 0 unless 3x3 taps keep its size, whose sides are multiples of 4.
-Dim tiles_of(const ConvTask& s) {
-  const ConvSettings& c = s.geometry->conv;
+Dim tiles_of(const ConvSizes& s) {
+  const ConvSettings& c = s.conv;
   const ConvSettings same{
       .height = c.height, .width = c.width, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1};
   return c == same && c.height % kSide == 0 && c.width % kSide == 0 ? c.height * c.width / (kSide * kSide)
                                                                     : 0;
 }
-Dim place_of(const ConvTask& s) { return s.cin * s.cout + kPadding; }
+Dim place_of(const ConvSizes& s) { return s.cin * s.cout + kPadding; }
 
 // The weights of the gradient: taps in reverse order, [3][3][cin][cout] -> [3][3][cout][cin].
 Tensor turned(Dim cin, Dim cout, const real* w) {
@@ -40,8 +40,8 @@ Tensor turned(Dim cin, Dim cout, const real* w) {
 }
 
 // Of maps of so many channels.
-TileJob tiles(const ConvTask& s, Dim channels, Dim first, Dim count) {
-  const ConvSettings& c = s.geometry->conv;
+TileJob tiles(const ConvSizes& s, Dim channels, Dim first, Dim count) {
+  const ConvSettings& c = s.conv;
   return {.tiles_down = c.height / kSide,
           .tiles_across = c.width / kSide,
           .map = {c.height * c.width * channels, c.width * channels, channels},
@@ -52,7 +52,7 @@ TileJob tiles(const ConvTask& s, Dim channels, Dim first, Dim count) {
 }
 
 // Of the places u of the weights.
-void filter(const ConvTask& s, const real* x, const Tensor& u, const real* bias, real negative_slope,
+void filter(const ConvSizes& s, const real* x, const Tensor& u, const real* bias, real negative_slope,
             Slot y) {
   const IsaKernels& isa = isa_kernels();
   const Dim all = s.images * tiles_of(s), strip = std::min(kTilesPerStrip, all);
@@ -67,26 +67,26 @@ void filter(const ConvTask& s, const real* x, const Tensor& u, const real* bias,
 
 }  // namespace
 
-bool is_winograd(const ConvTask& s) {
+bool is_winograd(const ConvSizes& s) {
   return s.images >= kFewestImages && tiles_of(s) >= kFewestTiles && s.cin % kTransformChannels == 0 &&
          s.cout % kTransformChannels == 0;
 }
 
-void winograd_conv(const ConvTask& s, const real* x, const real* w, const real* bias, real negative_slope,
+void winograd_conv(const ConvSizes& s, const real* x, const real* w, const real* bias, real negative_slope,
                    real* y) {
   Tensor u(Shape{kPlaces, place_of(s)});
   isa_kernels().filters({s.cin * s.cout, place_of(s)}, w, u.data());
   filter(s, x, u, bias, negative_slope, {y, Into::overwrite});
 }
 
-void winograd_grad_x(const ConvTask& s, const real* gy, const real* w, Slot gx) {
+void winograd_grad_x(const ConvSizes& s, const real* gy, const real* w, Slot gx) {
   Tensor u(Shape{kPlaces, place_of(s)});
   isa_kernels().filters({s.cin * s.cout, place_of(s)}, turned(s.cin, s.cout, w).data(), u.data());
-  filter({s.geometry, s.images, s.cout, s.cin}, gy, u, nullptr, 1, gx);
+  filter({s.conv, s.images, s.cout, s.cin}, gy, u, nullptr, 1, gx);
 }
 
 // du[place] = sum over tiles of (B^T d B)^T (A gy A^T),   gw = or += G^T du G
-void winograd_grad_w(const ConvTask& s, const real* x, const real* gy, Slot gw) {
+void winograd_grad_w(const ConvSizes& s, const real* x, const real* gy, Slot gw) {
   const IsaKernels& isa = isa_kernels();
   const Dim all = s.images * tiles_of(s), piece = std::min(kTilesPerPiece, all);
   Tensor v(Shape{kPlaces, place_step(piece, s.cin)}), m(Shape{kPlaces, place_step(piece, s.cout)});

@@ -44,8 +44,7 @@ Estimate Ensemble::estimate(const Tensor& inputs) const {
   const auto count = static_cast<real>(members_.size());
   const auto pixels = static_cast<std::size_t>(mean.picture.size());
   const std::size_t errors = predicted_error ? pixels : 0;
-  Scratch<double> squares(errors);  // from the pool: a picture takes no heap
-  std::fill_n(squares.data(), errors, 0.0);
+  std::vector<double, PoolAllocator<double>> squares(errors);  // a picture takes no heap
   mean.picture = mean.picture.clone();
   for (std::size_t m = 0; m < members_.size(); ++m) {
     const Estimate one = m == 0 ? mean : members_[m].estimate(inputs);

@@ -71,8 +71,7 @@ void expect_plain_is_fast(const char* what, bool same_order, Run run) {
 }
 
 void expect_plain_is_fast(const ConvSizes& s) {
-  const ConvTask task{&geometry_of(s.conv), s.images, s.cin, s.cout};
-  const bool same_order = !is_narrow(task) && !is_winograd(task);
+  const bool same_order = !is_narrow(s) && !is_winograd(s);
   const Dim taps = s.conv.taps(), fits = kRowsPerPiece / s.out_pixels();
   const Tensor x = numbers({s.images, s.in_pixels(), s.cin}), w = numbers({taps, s.cin, s.cout}, 2),
                bias = numbers({s.cout}, 3), gy = numbers({s.images, s.out_pixels(), s.cout}, 4);
@@ -130,8 +129,7 @@ TEST(ConvKernels, TheCasesTakeEveryWay) {
   int narrow = 0, winograd = 0, tiles = 0;
   for (const ConvCase& c : kConvCases) {
     const ConvSizes s = sizes_of(c, false, false);
-    const ConvTask task{&geometry_of(s.conv), s.images, s.cin, s.cout};
-    ++(is_narrow(task) ? narrow : is_winograd(task) ? winograd : tiles);
+    ++(is_narrow(s) ? narrow : is_winograd(s) ? winograd : tiles);
   }
   EXPECT_GE(narrow, 2);
   EXPECT_GE(winograd, 6);
