@@ -93,13 +93,6 @@ void backward(const Variable& loss) {
   }
 }
 
-Tensor* Backward::grad_of(std::size_t input) {
-  Node& x = *node_.inputs[input];
-  if (!x.requires_grad) return nullptr;
-  if (slot_of(input).into == Into::overwrite) x.grad.fill(0);
-  return &x.grad;
-}
-
 Slot Backward::slot_of(std::size_t input) {
   Node& x = *node_.inputs[input];
   if (!x.requires_grad) return {};

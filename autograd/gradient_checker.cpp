@@ -35,8 +35,9 @@ double weighted_sum(const Function& f) {
 Variable weighted(const Variable& y) {
   return record("weighted_sum", Tensor::zeros({}), {&y}, [](Backward& g) {
     const Tensor r = weights_for(g.value(0).shape());
-    Tensor* gy = g.grad_of(0);
-    for (Dim i = 0; i < r.size(); ++i) gy->data()[i] += g.gy().item() * r.data()[i];
+    const Slot gy = g.slot_of(0);
+    gy.begin(r.size());
+    for (Dim i = 0; i < r.size(); ++i) gy.data[i] += g.gy().item() * r.data()[i];
   });
 }
 

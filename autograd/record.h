@@ -25,11 +25,9 @@ class Backward {
   /// As it is now: who writes to an input between its forward pass and backward() gets another gradient, and
   /// nothing notices.
   const Tensor& value(std::size_t input) const { return node_.inputs[input]->value; }
-  /// The gradient of that input, zero-filled at first use; null when that input requires none. For steps that
-  /// add to an element more than once (sums, maxima).
-  Tensor* grad_of(std::size_t input);
-  /// The same without the zeros, for kernels: at first use the contents are undefined and the kernel must
-  /// write all of them. Asked for in the order of the inputs.
+  /// Where to leave the gradient of that input; empty when it requires none. At first use the contents are
+  /// undefined and all of them must be written; a step that adds to an element more than once (sums, maxima)
+  /// has Slot::begin() fill them with zeros. Asked for in the order of the inputs.
   Slot slot_of(std::size_t input);
   /// dL/dy to be changed in place: this step is its only reader.
   Tensor& mutable_gy() { return node_.grad; }

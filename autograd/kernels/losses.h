@@ -61,7 +61,7 @@ inline void kl_divergence_grad(Dim size, real g, const real* mean, const real* l
 /// The sum over images and their mean over window positions of the similarity of x and target, both [images,
 /// height, width], whose shorter side is 3 or more (autograd/ops/losses.h).
 double ssim(Dim images, Dim height, Dim width, const real* x, const real* target);
-/// gx += g times its derivative by x.
-void ssim_grad(Dim images, Dim height, Dim width, real g, const real* x, const real* target, real* gx);
+/// gx = or += g times its derivative by x.
+void ssim_grad(Dim images, Dim height, Dim width, real g, const real* x, const real* target, Slot gx);
 
 }  // namespace supertac::kernels

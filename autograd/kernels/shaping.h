@@ -62,9 +62,11 @@ void for_each_maximum(const Shape& shape, const real* x, Visit visit) {
 inline void max_pool2d(const Shape& shape, const real* x, real* y) {
   for_each_maximum(shape, x, [=](Dim from, Dim to) { y[to] = x[from]; });
 }
-/// gx[where the largest was] += gy
-inline void max_pool2d_grad(const Shape& shape, const real* x, const real* gy, real* gx) {
-  for_each_maximum(shape, x, [=](Dim from, Dim to) { gx[from] += gy[to]; });
+/// gx[where the largest was] = or += gy, elsewhere 0 or as it was
+inline void max_pool2d_grad(const Shape& shape, const real* x, const real* gy, Slot gx) {
+  if (!gx) return;
+  gx.begin(shape.elements());
+  for_each_maximum(shape, x, [=](Dim from, Dim to) { gx.data[from] += gy[to]; });
 }
 
 }  // namespace supertac::kernels

@@ -184,10 +184,12 @@ double ssim(Dim images, Dim height, Dim width, const real* x, const real* target
   for (Dim n = 0, at = 0; n < images; ++n, at += height * width) total += image.value(x + at, target + at);
   return total;
 }
-void ssim_grad(Dim images, Dim height, Dim width, real g, const real* x, const real* target, real* gx) {
+void ssim_grad(Dim images, Dim height, Dim width, real g, const real* x, const real* target, Slot gx) {
+  if (!gx) return;
+  gx.begin(images * height * width);
   SsimImage image(height, width);
   for (Dim n = 0, at = 0; n < images; ++n, at += height * width)
-    image.add_gradient(x + at, target + at, g, gx + at);
+    image.add_gradient(x + at, target + at, g, gx.data + at);
 }
 
 }  // namespace supertac::kernels

@@ -33,10 +33,8 @@ Variable ssim(const Variable& x, const Tensor& target) {
   const double total = kernels::ssim(images, height, width, x.value().data(), target.data());
   const auto value = static_cast<real>(total / static_cast<double>(images));
   const auto reverse = [=](Backward& g) {
-    Tensor* gx = g.grad_of(0);
-    if (gx == nullptr) return;
     const real each_image = g.gy().item() / static_cast<real>(images);
-    kernels::ssim_grad(images, height, width, each_image, g.value(0).data(), target.data(), gx->data());
+    kernels::ssim_grad(images, height, width, each_image, g.value(0).data(), target.data(), g.slot_of(0));
   };
   const OpSettings settings{.constant = target};
   return record("ssim", Tensor::full({}, value), {&x}, reverse, &settings);

@@ -47,8 +47,7 @@ Variable max_pool2d(const Variable& x) {
   Tensor y(Shape{x.dim(0), x.dim(1) / 2, x.dim(2) / 2, x.dim(3)});
   kernels::max_pool2d(x.shape(), x.value().data(), y.data());
   return record("max_pool2d", y, {&x}, [](Backward& g) {
-    if (Tensor* gx = g.grad_of(0))
-      kernels::max_pool2d_grad(gx->shape(), g.value(0).data(), g.gy().data(), gx->data());
+    kernels::max_pool2d_grad(g.value(0).shape(), g.value(0).data(), g.gy().data(), g.slot_of(0));
   });
 }
 

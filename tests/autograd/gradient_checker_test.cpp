@@ -1,7 +1,7 @@
 #include "autograd/gradient_checker.h"
 
 #include "autograd/ops/arithmetic.h"
-#include "autograd/record.h"
+#include "autograd/ops/elementwise.h"
 #include "tests/autograd/check.h"
 #include "tests/support/test.h"
 
@@ -19,11 +19,9 @@ GradientReport checked(const std::function<Variable(const std::vector<Variable>&
 Variable planted(const std::vector<Variable>& in, real by_b, real by_one) {
   const Tensor y = (in[0] * in[1] + in[0]).value();
   return record("planted", y, {&in[0], &in[1]}, [=](Backward& g) {
-    for (Dim i = 0; i < g.gy().size(); ++i) {
-      const real gy = g.gy().data()[i];
-      if (Tensor* ga = g.grad_of(0)) ga->data()[i] += gy * (by_b * g.value(1).data()[i] + by_one);
-      if (Tensor* gb = g.grad_of(1)) gb->data()[i] += gy * g.value(0).data()[i];
-    }
+    const real *gy = g.gy().data(), *a = g.value(0).data(), *b = g.value(1).data();
+    add_to_gradient(g, 0, [=](Dim i) { return gy[i] * (by_b * b[i] + by_one); });
+    add_to_gradient(g, 1, [=](Dim i) { return gy[i] * a[i]; });
   });
 }
 
@@ -61,8 +59,7 @@ TEST(GradientChecker, FailsOnPlantedErrors) {
 TEST(GradientChecker, FailsOnOneWrongElement) {
   const auto f = [](const std::vector<Variable>& in) {
     return record("planted", in[0].value().clone(), {&in[0]}, [](Backward& b) {
-      Tensor* gx = b.grad_of(0);
-      for (Dim i = 0; i < gx->size(); ++i) gx->data()[i] += b.gy().data()[i] * (i == 7 ? -1 : 1);
+      add_to_gradient(b, 0, [gy = b.gy().data()](Dim i) { return gy[i] * (i == 7 ? -1 : 1); });
     });
   };
   const GradientReport report = checked(f, {test::numbers({3, 4})});
@@ -83,8 +80,9 @@ TEST(GradientChecker, FailsOnOneWrongElement) {
 
 TEST(GradientChecker, FailsOnNotANumber) {
   const auto f = [](const std::vector<Variable>& in) {
-    return record("planted", in[0].value().clone(), {&in[0]},
-                  [](Backward& b) { b.grad_of(0)->fill(std::numeric_limits<real>::quiet_NaN()); });
+    return record("planted", in[0].value().clone(), {&in[0]}, [](Backward& b) {
+      add_to_gradient(b, 0, [](Dim) { return std::numeric_limits<real>::quiet_NaN(); });
+    });
   };
   EXPECT_GT(checked(f, {test::numbers({2})}).max_relative_error, 1e6);
 }

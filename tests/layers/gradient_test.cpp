@@ -69,15 +69,18 @@ struct Planted : ReverseWatch {
   Kind kind = sign;
 
   void reverse(Backward& b, const std::function<void()>& step) override {
-    Tensor* const gradient = b.node().op == op && input < b.node().input_count ? b.grad_of(input) : nullptr;
-    if (gradient == nullptr) return step();
-    const Tensor before = gradient->clone();
+    const bool is_it = b.node().op == op && input < b.node().input_count;
+    const Slot gradient = is_it ? b.slot_of(input) : Slot{};
+    if (!gradient) return step();
+    const auto size = static_cast<std::size_t>(b.value(input).size());
+    gradient.begin(b.value(input).size());
+    const std::vector<real> before(gradient.data, gradient.data + size);
     step();
-    std::vector<real> added(gradient->values().begin(), gradient->values().end());
-    for (std::size_t i = 0; i < added.size(); ++i) added[i] -= before.values()[i];
+    std::vector<real> added(gradient.data, gradient.data + size);
+    for (std::size_t i = 0; i < size; ++i) added[i] -= before[i];
     if (kind == index && !added.empty()) std::rotate(added.begin(), added.end() - 1, added.end());
-    for (std::size_t i = 0; i < added.size(); ++i)
-      gradient->values()[i] = before.values()[i] + added[i] * (kind == sign ? -1 : kind == twice ? 2 : 1);
+    for (std::size_t i = 0; i < size; ++i)
+      gradient.data[i] = before[i] + added[i] * (kind == sign ? -1 : kind == twice ? 2 : 1);
   }
 };
 
