@@ -10,31 +10,27 @@ namespace supertac::kernels {
 
 namespace {
 
-struct Pair {
-  std::int32_t input, output;
-};
-using Pairs = std::vector<std::vector<Pair>>;  // [taps]
-
-Pairs pairs_of(const ConvSettings& s) {
-  Pairs pairs(static_cast<std::size_t>(s.taps()));
+// Meetings come in ascending order of the pixels on either side.
+std::vector<TapPairs> pairs_of(const ConvSettings& s) {
+  std::vector<TapPairs> pairs(static_cast<std::size_t>(s.taps()));
   for_each_meeting({.conv = s, .images = 1}, [&](Dim tap, Dim input, Dim output) {
-    pairs[static_cast<std::size_t>(tap)].push_back(
-        {static_cast<std::int32_t>(input), static_cast<std::int32_t>(output)});
+    TapPairs& of_tap = pairs[static_cast<std::size_t>(tap)];
+    of_tap.inputs.push_back(static_cast<std::int32_t>(input));
+    of_tap.outputs.push_back(static_cast<std::int32_t>(output));
   });
-  for (auto& tap : pairs) std::ranges::sort(tap, {}, &Pair::output);
   return pairs;
 }
 
 // Groups the outputs of a (width x height) map by y mod stride_y and x mod stride_x; within a group every
 // output away from the border uses the same taps.
-std::vector<Phase> phases_of(const Pairs& pairs, bool to_input, Dim height, Dim width, Dim stride_h,
-                             Dim stride_w) {
+std::vector<Phase> phases_of(const std::vector<TapPairs>& pairs, bool to_input, Dim height, Dim width,
+                             Dim stride_h, Dim stride_w) {
   const auto pixels = static_cast<std::size_t>(height * width);
   std::vector<std::vector<std::int32_t>> source(pixels, std::vector<std::int32_t>(pairs.size(), -1));
   for (std::size_t t = 0; t < pairs.size(); ++t) {
-    for (const Pair p : pairs[t]) {
-      source[static_cast<std::size_t>(to_input ? p.input : p.output)][t] = to_input ? p.output : p.input;
-    }
+    const std::vector<std::int32_t>&to = to_input ? pairs[t].inputs : pairs[t].outputs,
+          &from = to_input ? pairs[t].outputs : pairs[t].inputs;
+    for (std::size_t i = 0; i < to.size(); ++i) source[static_cast<std::size_t>(to[i])][t] = from[i];
   }
   std::vector<Phase> phases;
   for (Dim py = 0; py < stride_h; ++py) {
@@ -63,19 +59,11 @@ std::vector<Phase> phases_of(const Pairs& pairs, bool to_input, Dim height, Dim 
 }
 
 Geometry build(const ConvSettings& s) {
-  const Pairs pairs = pairs_of(s);
-  Geometry g;
+  Geometry g{.forward = {}, .backward = {}, .pairs = pairs_of(s)};
   const Dim up_h = s.transposed ? s.stride_h : 1, up_w = s.transposed ? s.stride_w : 1;
   const Dim down_h = s.transposed ? 1 : s.stride_h, down_w = s.transposed ? 1 : s.stride_w;
-  g.forward = phases_of(pairs, false, s.out_height(), s.out_width(), up_h, up_w);
-  g.backward = phases_of(pairs, true, s.height, s.width, down_h, down_w);
-  for (const auto& tap : pairs) {
-    TapPairs& list = g.pairs.emplace_back();
-    for (const Pair p : tap) {
-      list.inputs.push_back(p.input);
-      list.outputs.push_back(p.output);
-    }
-  }
+  g.forward = phases_of(g.pairs, false, s.out_height(), s.out_width(), up_h, up_w);
+  g.backward = phases_of(g.pairs, true, s.height, s.width, down_h, down_w);
   return g;
 }
 
