@@ -68,49 +68,6 @@ TEST(Trainer, LearnsFromAugmentedWindows) {
   EXPECT_GT(std::abs(small.trainer().train_step().total - expected), 1e-3 * expected);
 }
 
-/// Blurred blobs on an array of 3 x 5 taxels with two channels, drawn four times as fine: five recordings
-/// with measured truths.
-WindowSet blobs() {
-  WindowSet frames({.timesteps = 1, .scale = 4, .scaling = {.rest = 1000, .span = 200}});
-  const RandomStream random(4, 0);
-  for (std::uint64_t group = 0; group < 5; ++group) {
-    Recording r;
-    r.truth_height = 12, r.truth_width = 20, r.array = {3, 5, 1, 2}, r.plate = std::to_string(group);
-    for (std::uint64_t i = 0; i < 8; ++i) {
-      const std::uint64_t n = 8 * group + i;
-      const double y = 3 * random.uniform(2 * n), x = 5 * random.uniform(2 * n + 1);
-      const auto blob = [&](double row, double column, double width) {
-        return static_cast<float>(std::exp(-((row - y) * (row - y) + (column - x) * (column - x)) / width));
-      };
-      r.time_s.push_back(static_cast<double>(i));
-      for (int k = 0; k < 15; ++k) {
-        const float v = blob(k / 5 + 0.5, k % 5 + 0.5, 2);
-        r.signals.insert(r.signals.end(), {1000 - 200 * v, 900 - 100 * v});
-      }
-      for (int p = 0; p < 240; ++p) r.truth.push_back(blob((p / 20 + 0.5) / 4, (p % 20 + 0.5) / 4, 0.5));
-    }
-    frames.add(r);
-  }
-  return frames;
-}
-
-Recipe small_frames() {
-  Recipe s = Recipe::named("frame");
-  s.model.rows = 3, s.model.columns = 5, s.model.in_channels = 2;
-  s.model.channels = 8;
-  s.model.rcabs = 1;
-  s.epochs = 3;
-  s.batch = 8;
-  s.seed = 5;
-  return s;
-}
-
-std::vector<std::uint32_t> first(std::uint32_t count) {
-  std::vector<std::uint32_t> indices(count);
-  std::iota(indices.begin(), indices.end(), 0U);
-  return indices;
-}
-
 using MakeTrainer = std::function<Trainer()>;
 
 std::string checkpoint_of(const MakeTrainer& make, int threads, std::int64_t interrupted_after) {
@@ -137,14 +94,15 @@ class TrainerBytes : public testing::Test {
   TrainerBytes() {
     windows_.recipe.augment = {.gain = 0.5, .noise = 0.02};
     muon_.recipe.muon = true, muon_.recipe.epochs = 1;  // its steps take longer
+    frames_.recipe.model.timesteps = 1, frames_.recipe.per_window = false;
+    frames_.windows = small_windows(frames_.recipe.model, 40);
   }
-  const std::vector<MakeTrainer> makers_ = {
-      [this] { return windows_.trainer(); }, [this] { return muon_.trainer(); },
-      [this] { return Trainer(frames_, first(32), Objective(frames_, small_frames())); }};
+  const std::vector<MakeTrainer> makers_ = {[this] { return windows_.trainer(); },
+                                            [this] { return muon_.trainer(); },
+                                            [this] { return frames_.trainer(); }};
 
  private:
-  SmallTraining windows_, muon_;
-  const WindowSet frames_ = blobs();
+  SmallTraining windows_, muon_, frames_;
 };
 
 TEST_F(TrainerBytes, AreTheSameForAnyNumberOfThreads) {
