@@ -1,7 +1,7 @@
 // supertac-plate: a plate as STL, to print.
 
 #include "apps/common/command_line/program.h"
-#include "data/plates/plate_mesh.h"
+#include "data/plates/stl.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 

@@ -14,7 +14,7 @@
 
 #include "data/map/surface_map.h"
 #include "data/windows/live_window.h"
-#include "data/windows/transforms/normalise_window.h"
+#include "data/windows/transforms.h"
 #include "data/windows/windows.h"
 #include "io/numbers/numbers.h"
 #include "library/guard.h"

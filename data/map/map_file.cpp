@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "data/map/elements.h"
-#include "data/plates/plate_mesh.h"
 #include "data/plates/stl.h"
 #include "io/files/safetensors.h"
 #include "io/images/images.h"
@@ -124,7 +123,7 @@ std::string table_of(const std::vector<NamedMap>& maps) {
 // places are those of the outermost cells.
 std::vector<Triangle> solid_of(const NamedMap& map) {
   const MapRegion& r = map.cells.region;
-  const double bottom = -kSunkMm - MeshSettings{}.base_mm;
+  const double bottom = -kSunkMm - kSolidBaseMm;
   using Point = std::array<float, 3>;
   const auto point = [&](std::int64_t row, std::int64_t column, bool top) {
     const std::int64_t i = std::clamp<std::int64_t>(row, 0, r.height - 1),

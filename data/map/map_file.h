@@ -33,7 +33,7 @@ void check_map_path(const std::string& path);
 ///                 cell_mm the size of a cell, [x,y] both
 ///   .csv          a row for each element (data/map/elements.h) of each map, lengths in mm; kind of its map
 ///   .stl          one map as a solid to print, 1 being rig::kTextureHeightMm high, as far above its bottom
-///                 as plate_mesh.h's; what was never felt lies kSunkMm below the plane
+///                 as a plate's (data/plates/stl.h); what was never felt lies kSunkMm below the plane
 /// Throws std::invalid_argument as check_map_path(), for no map, or more than one for .stl; FileError.
 void write_maps(const OutputPath& output, const std::vector<NamedMap>& maps);
 

@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include "data/plates/stl.h"
-#include "data/plates/surface.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/same_bits.h"
@@ -53,12 +52,9 @@ constexpr TextureKind kKinds[] = {
     {.word = "waves", .width = half_pitch, .height = wave, .lowest = -1},
     {.word = "blobs", .width = diameter, .height = half_round, .lines = false, .round = true}};
 
-struct RigPlate {
-  const char *name, *generic;
-};
-constexpr RigPlate kRigPlates[] = {{"3_Bumps", "bumps12"},  {"6_Bumps", "bumps6"}, {"4_Ridges", "ridges9"},
-                                   {"6_Ridges", "ridges6"}, {"4_Waves", "waves9"}, {"6_Waves", "waves6"},
-                                   {"4_Blob", "blobs9"},    {"6_Blob", "blobs6"}};
+constexpr std::pair<const char*, const char*> kRigPlates[] = {
+    {"3_Bumps", "bumps12"}, {"6_Bumps", "bumps6"}, {"4_Ridges", "ridges9"}, {"6_Ridges", "ridges6"},
+    {"4_Waves", "waves9"},  {"6_Waves", "waves6"}, {"4_Blob", "blobs9"},    {"6_Blob", "blobs6"}};
 
 int elements_that_fit(double length, double pitch, double width) {
   if (length + kFitSlackMm < width) return 0;
@@ -162,8 +158,8 @@ Texture parse_texture(std::string_view text, const std::string& name) {
 }
 
 std::string generic_name(const std::string& name) {
-  for (const RigPlate& plate : kRigPlates)
-    if (name == plate.name) return plate.generic;
+  for (const auto& [of_rig, generic] : kRigPlates)
+    if (name == of_rig) return generic;
   return name;
 }
 
@@ -222,12 +218,6 @@ const std::vector<std::string>& default_plates() {
   static const std::vector<std::string> kNames = {"bumps12",  "bumps6",  "bumps4",
                                                   "ridges12", "ridges6", "ridges4"};
   return kNames;
-}
-
-Plate random_plate(std::uint32_t number) {
-  const std::string name = std::string(kRandom) + std::to_string(number);
-  const DrawnPlate drawn = draw_plate(number);
-  return drawn.surface ? Plate(name, drawn.surface) : Plate(name, drawn.textures);
 }
 
 bool resemble(const Plate& a, const Plate& b) {

@@ -1,3 +1,4 @@
+// Textured plates: what lies where, by name, by number or from a file.
 #pragma once
 
 #include <cstdint>
@@ -5,9 +6,39 @@
 #include <string>
 #include <vector>
 
-#include "data/plates/surface.h"
+#include "data/sensors/rig.h"
 
 namespace supertac {
+
+/// What a plate measures, in mm; members mean what they mean in Plate.
+struct PlateExtent {
+  double max_height = 0, min_height = 0;
+  /// Along y, what lies before the one and behind the other is flat, at 0, unless the plate ends there.
+  double texture_begin = 0, texture_end = 0;
+  bool uniform_in_x = true;
+  std::vector<double> crests = {};
+};
+
+/// The shape of a plate: rows of equal elements, the height map of an STL file, or what random_plate() draws.
+class Surface {
+ public:
+  virtual ~Surface() = default;
+  virtual double height(double x_mm, double y_mm) const = 0;
+  const PlateExtent& extent() const { return extent_; }
+
+ protected:
+  PlateExtent extent_;
+};
+
+/// One texture of a plate: equal elements, pitch_mm apart, 0 between them. Ridges are triangular, 2.5 mm wide
+/// at most; bumps half cylinders, blobs half spheres, twice as wide as high; waves a cosine.
+struct Texture {
+  std::string kind = "plain";  ///< or ridges, bumps, waves (lines along x) or blobs
+  double pitch_mm = 0;         ///< distance between neighbouring centres
+  double height_mm = 0;        ///< of the highest point above the plate's base
+  /// The texture is laid out in [from, to], centred, as many elements as fit whole.
+  double from_mm = rig::kTextureFromMm, to_mm = rig::kTextureToMm;
+};
 
 /// The surface the finger slides over: rig::kPlateWidthMm (x) by kPlateLengthMm (y), with its texture in the
 /// middle third. Coordinates are the plate's own, origin at its corner; z = 0 is its flat part.
@@ -62,8 +93,12 @@ class Plate {
 /// Names of the six plates that simulations use by default: the paper's bumps and ridges at 12, 6 and 4 mm.
 const std::vector<std::string>& default_plates();
 
-/// The plate called "random<number>": what networks for unseen plates are trained and tested on
-/// (data/plates/surface.h says how it is drawn).
+/// The plate called "random<number>": what networks for unseen plates are trained and tested on. Kind, layout
+/// and sizes are drawn from the number alone:
+///   plain                                                            1 in 16
+///   equal elements in rows (ridges, bumps, blobs, waves), or two such textures one behind the other
+///   lines with a pitch of their own each, some oblique; single lines; scattered round elements; smooth hills
+/// Pitches 4 to 15 mm, heights .5 to 3 mm; more than half of the lines and rounds have the size of the rig's.
 Plate random_plate(std::uint32_t number);
 
 /// True when both have a texture of the same kind whose pitches differ by less than half a millimetre: a

@@ -1,22 +1,22 @@
-#include "data/plates/plate_mesh.h"
+// Plates as solids.
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
-#include "io/numbers/numbers.h"
+#include "data/plates/stl.h"
 
 namespace supertac {
 namespace {
 
+constexpr double kStepMm = HeightMap::kCellMm;
 constexpr double kSliverMm = 1e-3;  // lines, and heights, closer than this are one
 
 using Vertex = std::array<float, 3>;
 
 // Multiples of the step within (low, high), and these two.
-std::vector<double> lattice(double low, double high, double step) {
+std::vector<double> lattice(double low, double high) {
   std::vector<double> lines = {low, high};
-  for (auto i = std::ceil(low / step); i * step < high; ++i) lines.push_back(i * step);
+  for (auto i = std::ceil(low / kStepMm); i * kStepMm < high; ++i) lines.push_back(i * kStepMm);
   return lines;
 }
 
@@ -28,9 +28,9 @@ std::vector<double> without_slivers(std::vector<double> lines) {
   return kept;
 }
 
-std::vector<double> lines_along_y(const Plate& plate, double step) {
+std::vector<double> lines_along_y(const Plate& plate) {
   const double begin = std::max(0.0, plate.texture_begin()), end = plate.texture_end();
-  std::vector<double> lines = lattice(begin, std::max(begin, end), step);
+  std::vector<double> lines = lattice(begin, std::max(begin, end));
   lines.insert(lines.end(), {0, rig::kPlateLengthMm});
   for (const double crest : plate.crests()) lines.push_back(crest);
   return without_slivers(lines);
@@ -51,10 +51,10 @@ bool is_same_along_x(const Plate& plate, const std::vector<double>& xs, const st
          });
 }
 
-Top top_of(const Plate& plate, double step) {
+Top top_of(const Plate& plate) {
   Top top;
-  top.xs = without_slivers(lattice(0, rig::kPlateWidthMm, step));
-  top.ys = lines_along_y(plate, step);
+  top.xs = without_slivers(lattice(0, rig::kPlateWidthMm));
+  top.ys = lines_along_y(plate);
   if (is_same_along_x(plate, top.xs, top.ys)) top.xs = {0, rig::kPlateWidthMm};
   for (const double y : top.ys)
     for (const double x : top.xs)
@@ -76,14 +76,9 @@ std::vector<Vertex> outline_of(const Top& top) {
 
 }  // namespace
 
-std::vector<Triangle> mesh_of(const Plate& plate, const MeshSettings& settings) {
-  if (!(settings.resolution_mm >= 0.02 && settings.resolution_mm <= 5) ||
-      !(settings.base_mm >= 0.2 && settings.base_mm <= 100))
-    throw std::invalid_argument(
-        "mesh_of: expected a resolution of 0.02 to 5 mm and a base of 0.2 to 100 mm, got " +
-        format(settings.resolution_mm) + " and " + format(settings.base_mm));
-  const Top top = top_of(plate, settings.resolution_mm);
-  const auto bottom = static_cast<float>(plate.min_height() - settings.base_mm);
+std::vector<Triangle> mesh_of(const Plate& plate) {
+  const Top top = top_of(plate);
+  const auto bottom = static_cast<float>(plate.min_height() - kSolidBaseMm);
   std::vector<Triangle> solid;
   const auto add_quad = [&](const Vertex& a, const Vertex& b, const Vertex& c, const Vertex& d) {
     solid.push_back({a, b, c});

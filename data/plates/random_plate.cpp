@@ -1,5 +1,5 @@
 // What random plates look like.
-#include "data/plates/surface.h"
+#include "data/plates/plate.h"
 
 #include <algorithm>
 #include <cmath>
@@ -125,20 +125,20 @@ std::vector<Element> draw_scattered(Draw& draw, double from_mm, double to_mm) {
   return elements;
 }
 
-DrawnPlate made_of(std::vector<Element> elements) {
-  return {{}, std::make_shared<const Elements>(std::move(elements))};
-}
-
 }  // namespace
 
-DrawnPlate draw_plate(std::uint32_t number) {
+Plate random_plate(std::uint32_t number) {
   Draw draw(number);
   const double from = draw.between(30, 40), to = draw.between(60, 78), layout = draw.between(-1, 16);
-  if (layout < 1) return {};
-  if (layout < 8) return {{draw_texture(draw, from, to)}};
+  const std::string name = "random" + std::to_string(number);
+  const auto made_of = [&](std::vector<Element> elements) {
+    return Plate(name, std::make_shared<const Elements>(std::move(elements)));
+  };
+  if (layout < 1) return {name, std::vector<Texture>{}};
+  if (layout < 8) return {name, {draw_texture(draw, from, to)}};
   if (layout < 9.5) {
     const double middle = (from + to) / 2;
-    return {{draw_texture(draw, from, middle), draw_texture(draw, middle, to)}};
+    return {name, {draw_texture(draw, from, middle), draw_texture(draw, middle, to)}};
   }
   if (layout < 13.5) return made_of(draw_lines(draw, from, to));
   if (layout < 14.5) {

@@ -1,4 +1,5 @@
-// STL files: triangles in mm, written binary, read in both forms; and the surface that they make.
+// STL files: triangles in mm, written binary, read in both forms; the surface that they make, and the
+// triangles of a plate.
 #pragma once
 
 #include <array>
@@ -9,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "data/plates/surface.h"
+#include "data/plates/plate.h"
 
 namespace supertac {
 
@@ -71,5 +72,16 @@ class HeightMap : public Surface {
   void measure();
   void find_crests();
 };
+
+/// Material of a solid below its lowest point.
+inline constexpr double kSolidBaseMm = 3;
+
+/// The plate as a solid to print, in its own coordinates: textured top, four walls, flat bottom. Closed and
+/// manifold (every edge belongs to two triangles, in opposite directions), outside by the right-hand rule.
+/// Heights are exact at points HeightMap::kCellMm apart in the textured part, and straight between them;
+/// lines along x are placed on every crest and where the texture begins and ends, so that peaks keep their
+/// height. A plate that was read from STL is the same plate when it is written and read again. A texture that
+/// varies along y only has no points between its sides.
+std::vector<Triangle> mesh_of(const Plate& plate);
 
 }  // namespace supertac

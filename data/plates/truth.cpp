@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "io/numbers/median.h"
 
 namespace supertac {
 
@@ -50,6 +53,25 @@ Zone zone_of(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid
 
 bool in_contact(std::span<const float> truth, float level) {
   return std::any_of(truth.begin(), truth.end(), [&](float v) { return level > 0 ? v > level : v != 0; });
+}
+
+float contact_level(std::span<const float> truth, std::size_t pixels) {
+  constexpr double kSigmas = 6, kMost = 0.1, kSigmasOf95 = 1.645;
+  constexpr std::size_t kShare = 10, kLeastFrames = 3, kMostFrames = 200;
+  const std::size_t frames = truth.size() / pixels;
+  std::vector<double> sums(frames);
+  for (std::size_t i = 0; i < frames * pixels; ++i) sums[i / pixels] += double{truth[i]};
+  std::vector<std::size_t> quiet(frames);
+  std::iota(quiet.begin(), quiet.end(), std::size_t{0});
+  std::ranges::stable_sort(quiet, {}, [&](std::size_t f) { return sums[f]; });
+  quiet.resize(std::min(frames / kShare, kMostFrames));
+  if (quiet.size() < kLeastFrames) return 0;
+  std::vector<double> values;
+  for (const std::size_t f : quiet)
+    for (const float v : truth.subspan(f * pixels, pixels)) values.push_back(double{v});
+  const double rest = median(values);
+  const double noise = kSigmas * (quantile(values, 0.95) - rest) / kSigmasOf95;
+  return noise <= kMost ? static_cast<float>(rest + noise) : 0;
 }
 
 }  // namespace supertac

@@ -37,4 +37,11 @@ Zone zone_of(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid
 /// that was measured, when a pixel shows more than `level`.
 bool in_contact(std::span<const float> truth, float level = 0);
 
+/// From which level on a truth that was measured is contact. Of a truth [frames][pixels] that a film or a
+/// camera measured: its level at rest and six times its noise there. Both are taken from the pixels of the
+/// tenth of the frames that sum to the least: their median, and how far their 95th percentile lies above it,
+/// since noise is often cut off at 0. 0 where these frames are fewer than three, or where they differ by more
+/// than a tenth of the range: then nothing rests.
+float contact_level(std::span<const float> truth, std::size_t pixels);
+
 }  // namespace supertac

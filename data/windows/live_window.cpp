@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "data/windows/transforms/normalise_window.h"
+#include "data/windows/transforms.h"
 
 namespace supertac {
 namespace {

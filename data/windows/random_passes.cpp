@@ -122,13 +122,13 @@ void add_silent_passes(WindowSet& windows, std::uint64_t seed, bool many) {
 
 void add_random_passes(WindowSet& windows, const RandomPasses& passes) {
   constexpr std::size_t kAtOnce = 64;
-  const int stride = std::max(1, static_cast<int>(kStrideS * windows.settings().rate_hz));
+  const WindowSettings settings = windows.settings();  // of an empty set the first pass would decide the rest
+  const int stride = std::max(1, static_cast<int>(kStrideS * settings.rate_hz));
   const std::size_t first_plate = kFirstTrainingPlate + passes.seed % kSeeds * kPlatesOfASeed;
   for (std::size_t first = 0; first < passes.count; first += kAtOnce) {
     std::vector<Recording> recordings(std::min(kAtOnce, passes.count - first));
     parallel_for(recordings.size(), [&](std::size_t i) {
-      recordings[i] =
-          simulate(static_cast<std::uint32_t>(first_plate + first + i), passes, windows.settings());
+      recordings[i] = simulate(static_cast<std::uint32_t>(first_plate + first + i), passes, settings);
     });
     for (const Recording& recording : recordings)
       windows.add(recording, ".", {.training_only = true, .augmentable = false, .stride = stride});

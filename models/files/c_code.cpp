@@ -10,7 +10,7 @@
 
 #include "c99_text.h"
 #include "data/windows/live_window.h"
-#include "data/windows/transforms/normalise_window.h"
+#include "data/windows/transforms.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"

@@ -4,7 +4,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "data/windows/transforms/normalise_window.h"
+#include "data/windows/transforms.h"
 #include "io/numbers/numbers.h"
 #include "models/files/onnx_file.h"
 #include "models/inference/interval.h"

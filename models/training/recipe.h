@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "data/windows/split.h"
-#include "data/windows/transforms/augment.h"
+#include "data/windows/transforms.h"
 #include "models/inference/interval.h"
 #include "models/networks/supertac_model.h"
 #include "models/training/loss/loss.h"

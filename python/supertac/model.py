@@ -20,7 +20,7 @@ class Pictures(NamedTuple):
     latents: Any
 
 
-# Of normalised windows (data/windows/transforms/normalise_window.h).
+# Of normalised windows (data/windows/transforms.h).
 BINS, LEAST_GAIN, REST_REMOVED, REST_SHARE, TOP_RANK = 256, np.float32(0.15), np.float32(0.5), 20, 3
 
 OWN = ("encoder.", "decoder.", "upsampler.")  # tensors of the network; others belong to what stands beside it

@@ -7,6 +7,10 @@
 
 namespace supertac {
 
+/// The plates of the rig.
+inline const std::vector<std::string> kRigPlates = {"3_Bumps", "6_Bumps", "4_Ridges", "6_Ridges",
+                                                    "4_Waves", "6_Waves", "4_Blob",   "6_Blob"};
+
 /// What a test wants to know of a recording: frame i of taxel k holds a voltage that tells i and k apart.
 struct PassPlan {
   std::string plate = "bumps12";

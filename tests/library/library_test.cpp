@@ -5,7 +5,7 @@
 #include "data/map/surface_map.h"
 #include "data/recordings/recording.h"
 #include "data/windows/live_window.h"
-#include "data/windows/transforms/normalise_window.h"
+#include "data/windows/transforms.h"
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/random.h"

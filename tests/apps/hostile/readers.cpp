@@ -5,7 +5,6 @@
 
 #include "data/frames/board_frame.h"
 #include "data/plates/plate.h"
-#include "data/plates/plate_mesh.h"
 #include "data/plates/stl.h"
 #include "data/recordings/imports/table_import.h"
 #include "data/recordings/imports/text_import.h"
@@ -138,8 +137,7 @@ std::vector<Reader> readers(const std::string& folder) {
     write_frame({}, std::span(frames).subspan(i * rig::kFrameBytes).first<rig::kFrameBytes>());
   return {
       {"journal", good_journal(folder + "/journal"), [](const Bytes& b) { check_journal(b); }},
-      {"stl", stl_bytes(mesh_of(Plate::named("ridges6"), {.resolution_mm = 5}), "x"),
-       [](const Bytes& b) { check_stl(b); }},
+      {"stl", stl_bytes(mesh_of(Plate::named("plain")), "x"), [](const Bytes& b) { check_stl(b); }},
       {"safetensors", recording, from_file([](const std::string& f) { (void)SafetensorsFile::read(f); })},
       {"recording", recording, from_file([](const std::string& f) { (void)read_recording(f); })},
       {"text", bytes_of(lines), from_file([](const std::string& f) {

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "data/plates/plate_mesh.h"
+#include "data/plates/stl.h"
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
@@ -134,8 +134,7 @@ TEST_F(Audit, APartThatIsRepeatedGivesTheLedgersLines) {
 }
 
 TEST_F(Audit, NamesMayHoldSpaces) {
-  write_file(path("my plate.stl"),
-             stl_bytes(mesh_of(Plate::named("6_Bumps"), {.resolution_mm = 1}), "6_Bumps"));
+  write_file(path("my plate.stl"), stl_bytes(mesh_of(Plate::named("6_Bumps")), "6_Bumps"));
   const std::vector<std::vector<std::string>> commands = {
       {"supertac-simulate", "--out", path("my data"), "--plates", path("my plate.stl"), "--speeds", "10",
        "--passes", "1"},

@@ -1,8 +1,13 @@
 #include "data/plates/plate.h"
 
+#include "data/plates/stl.h"
+#include "data/windows/windows.h"
+#include "io/files/file.h"
+#include "io/numbers/hash.h"
+#include "tests/data/test_recordings.h"
 #include "tests/support/test.h"
 
-namespace supertac::plates_plate_test {
+namespace supertac::plate_test {
 
 struct RigRow {
   const char* name;
@@ -105,4 +110,148 @@ TEST(Plate, RefusesNamesItCannotRead) {
   }
 }
 
-}  // namespace supertac::plates_plate_test
+void write_plate(const std::string& path, const std::string& name) {
+  write_file(path, stl_bytes(mesh_of(Plate::named(name)), name));
+}
+
+TEST(PlateFile, NamedReadsAnStlFileAndDropsItsFolder) {
+  const TemporaryFolder folder;
+  write_plate(folder / "my.stl", "6_Bumps");
+  const Plate plate = Plate::named(folder / "my.stl");
+  EXPECT_EQ(plate.name(), "my.stl");
+  EXPECT_NEAR(plate.height(18, 39), 2.5, 1e-3);
+  EXPECT_EQ(plate.crests().size(), 6u);
+  EXPECT_EQ(what_of<FileError>([&] { Plate::named(folder / "other.stl"); }),
+            folder / "other.stl" + ": cannot open the file: No such file or directory; check the name");
+}
+
+TEST(PlateFile, IsKeptBesideTheRecordingsAndNeverReplacedByAnother) {
+  const TemporaryFolder folder;
+  make_directories(folder / "out");
+  write_plate(folder / "my.stl", "6_Bumps");
+  keep_plate_file("6_Bumps", folder / "out");
+  keep_plate_file(folder / "my.stl", folder / "out");
+  keep_plate_file(folder / "my.stl", folder / "out");
+  EXPECT_EQ(plate_in_folder("my.stl", folder / "out").crests().size(), 6u);
+  EXPECT_EQ(plate_in_folder("3_Bumps", folder / "out").name(), "3_Bumps");
+  write_plate(folder / "my.stl", "3_Bumps");
+  EXPECT_EQ(what_of<FileError>([&] { keep_plate_file(folder / "my.stl", folder / "out"); }),
+            folder / "out/my.stl" + ": is another plate than " + folder / "my.stl" +
+                "; rename one of them or choose another folder");
+}
+
+TEST(PlateFile, ARecordingMayNotNameAFileElsewhere) {
+  const TemporaryFolder folder;
+  write_plate(folder / "my.stl", "6_Bumps");
+  const auto refused = [&](const std::string& name, const std::string& in) {
+    EXPECT_EQ(what_of<std::invalid_argument>([&] { plate_in_folder(name, in); }),
+              "plate '" + name + "': expected the name of an STL file beside the recordings, found a path");
+  };
+  refused("../" + folder.path() + "/my.stl", folder.path());
+  refused(folder / "my.stl", ".");
+}
+
+TEST(PlateFile, WindowsTakeTheirTruthFromIt) {
+  const TemporaryFolder folder;
+  write_plate(folder / "my.stl", "4_Blob");
+  Recording recording = make_recording({.plate = "my.stl", .frames = 300});
+  write_recording(folder / "a.safetensors", recording);
+  const WindowSet set = WindowSet::load(folder.path(), {}, {.timesteps = 32});
+  recording.plate = "4_Blob";
+  WindowSet named({.timesteps = 32});
+  named.add(recording);
+  ASSERT_EQ(set.size(), named.size());
+  std::vector<float> truth(256), expected(256);
+  for (std::size_t i = 0; i < set.size(); i += 50) {
+    set.truth(i, truth);
+    named.truth(i, expected);
+    double squares = 0;  // the foot of a blob is upright: single pixels there may differ by .1
+    for (std::size_t k = 0; k < truth.size(); ++k) squares += std::pow(double{truth[k] - expected[k]}, 2);
+    EXPECT_LT(std::sqrt(squares / 256), 0.02) << i;
+  }
+  const std::string before = set.fingerprint();
+  write_plate(folder / "my.stl", "6_Blob");  // another plate of the same name is other data
+  EXPECT_NE(WindowSet::load(folder.path(), {}, {.timesteps = 32}).fingerprint(), before);
+}
+
+TEST(RandomPlate, IsWhatItsNumberSays) {
+  for (const std::uint32_t number : {0U, 7U, 4'000'000'000U}) {
+    const Plate a = random_plate(number), b = Plate::named("random" + std::to_string(number));
+    EXPECT_EQ(a.name(), b.name());
+    for (double y = 20; y < 90; y += 1.7)
+      for (double x = 0; x < 36; x += 3.1) ASSERT_EQ(a.height(x, y), b.height(x, y)) << number;
+  }
+  for (const char* name : {"random", "random-1", "random4294967296"})
+    EXPECT_THROW(Plate::named(name), std::invalid_argument) << name;
+}
+
+// A seed's plates are the same for ever: trainings are repeated from it.
+TEST(RandomPlate, PinnedBits) {
+  Hash hash;
+  for (std::uint32_t number = 0; number < 64; ++number) {
+    const Plate plate = random_plate(number);
+    for (double y = 0; y < 108; y += 0.9)
+      for (double x = 0; x < 36; x += 2.1) hash.add(static_cast<float>(plate.height(x, y)));
+  }
+  EXPECT_EQ(hash.hex(), "30417ebc997890c2");
+}
+
+TEST(RandomPlate, HasEveryKindOfTextureWithinItsBounds) {
+  std::map<std::string, int> kinds;
+  int plain = 0, oblique_or_scattered = 0, two = 0;
+  for (std::uint32_t number = 0; number < 400; ++number) {
+    const Plate plate = random_plate(number);
+    EXPECT_GE(plate.min_height(), -3) << number;
+    EXPECT_LE(plate.max_height(), 3) << number;
+    EXPECT_GE(plate.texture_begin(), 0) << number;
+    EXPECT_LE(plate.texture_end(), rig::kPlateLengthMm) << number;
+    EXPECT_EQ(plate.height(18, 2), 0) << number;  // the onset is on the flat plate
+    plain += plate.max_height() == 0 ? 1 : 0;
+    two += plate.textures().size() == 2 ? 1 : 0;
+    oblique_or_scattered += plate.textures().empty() && !plate.uniform_in_x() ? 1 : 0;
+    for (const Texture& t : plate.textures()) {
+      ++kinds[t.kind];
+      EXPECT_GE(t.pitch_mm, 4);
+      EXPECT_LE(t.pitch_mm, 15);
+    }
+  }
+  EXPECT_EQ(kinds.size(), 4U);
+  for (const auto& [kind, count] : kinds) EXPECT_GT(count, 20) << kind;
+  EXPECT_NEAR(plain, 47, 15);
+  EXPECT_GT(two, 15);
+  EXPECT_GT(oblique_or_scattered, 40);
+}
+
+// What the surface says of itself must be what its heights say.
+TEST(RandomPlate, KnowsItsHeightExtentAndDirection) {
+  for (std::uint32_t number = 0; number < 60; ++number) {
+    const Plate plate = random_plate(number);
+    double highest = 0;
+    for (double y = 0; y <= rig::kPlateLengthMm; y += 0.25)
+      for (double x = 0; x <= rig::kPlateWidthMm; x += 0.5) {
+        const double z = plate.height(x, y);
+        highest = std::max(highest, z);
+        if (z != 0) {
+          EXPECT_GE(y, plate.texture_begin() - 1e-9) << number;
+          EXPECT_LE(y, plate.texture_end() + 1e-9) << number;
+        }
+        ASSERT_TRUE(!plate.uniform_in_x() || z == plate.height(0, y)) << number;
+      }
+    EXPECT_LE(highest, plate.max_height() + 1e-12) << number;
+    EXPECT_GE(highest, 0.8 * plate.max_height()) << number;
+  }
+}
+
+TEST(RandomPlate, ResemblanceIsKindAndPitch) {
+  const auto resembles = [](const char* a, const char* b) {
+    return resemble(Plate::named(a), Plate::named(b));
+  };
+  EXPECT_TRUE(resembles("3_Bumps", "bumps12"));
+  EXPECT_TRUE(resembles("bumps11.6h1", "3_Bumps"));
+  EXPECT_TRUE(resembles("ridges4+bumps12", "3_Bumps"));
+  EXPECT_FALSE(resembles("bumps11.4", "3_Bumps"));
+  EXPECT_FALSE(resembles("ridges12", "3_Bumps"));
+  EXPECT_FALSE(resembles("plain", "3_Bumps"));
+}
+
+}  // namespace supertac::plate_test

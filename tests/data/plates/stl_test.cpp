@@ -4,6 +4,8 @@
 #include <ctime>
 
 #include "io/files/file.h"
+#include "io/numbers/random.h"
+#include "tests/data/test_recordings.h"
 #include "tests/fuzz/corpus.h"
 #include "tests/fuzz/stl_properties.h"
 #include "tests/support/test.h"
@@ -132,5 +134,209 @@ TEST(Stl, FilesAreReadWithALimit) {
 }
 
 TEST(Stl, FuzzCorpus) { EXPECT_GE(replay("stl", check_stl), 256); }
+
+using Point = std::array<float, 3>;
+
+void add_quad(std::vector<Triangle>& triangles, const Point& a, const Point& b, const Point& c,
+              const Point& d) {
+  triangles.push_back({a, b, c});
+  triangles.push_back({a, c, d});
+}
+
+// A sheet of 36 x 108 mm at height z with its corner at (x, y).
+std::vector<Triangle> sheet(float z = 0, float x = 0, float y = 0) {
+  std::vector<Triangle> triangles;
+  add_quad(triangles, {x, y, z}, {x + 36, y, z}, {x + 36, y + 108, z}, {x, y + 108, z});
+  return triangles;
+}
+
+HeightMap height_map_of(const std::vector<Triangle>& triangles) { return {triangles, 36, 108, "plate.stl"}; }
+
+void expect_map_refused(const std::vector<Triangle>& triangles, const std::string& expected) {
+  EXPECT_ERROR(height_map_of(triangles), FileError, expected);
+}
+
+TEST(HeightMap, HeightIsThatOfTheHighestTriangleAboveTheOutline) {
+  auto triangles = sheet(7, -20, 300);                                              // anywhere, at any height
+  add_quad(triangles, {-10, 340, 8}, {-5, 340, 8}, {-5, 350, 8}, {-10, 350, 8});    // a step of 1 mm
+  add_quad(triangles, {-10, 340, 4}, {-10, 350, 4}, {-5, 350, 4}, {-5, 340, 4});    // below: hidden
+  triangles.push_back({Point{0, 340, 7}, Point{10, 340, 7}, Point{0, 340, 9.5F}});  // a wall
+  const HeightMap map = height_map_of(triangles);
+  EXPECT_EQ(map.height(12, 45), 1);
+  EXPECT_EQ(map.height(9.5, 45), 0);
+  EXPECT_EQ(map.height(12, 39.5), 0);
+  EXPECT_NEAR(map.height(20, 40), 2.5, 1e-5);
+  EXPECT_NEAR(map.height(25, 40), 1.25, 1e-5);
+  EXPECT_EQ(map.height(25, 40.5), 0);
+  EXPECT_EQ(map.extent().max_height, 2.5);
+  EXPECT_EQ(map.extent().min_height, 0);
+  EXPECT_EQ(map.extent().texture_begin, 39.875);
+  EXPECT_EQ(map.extent().texture_end, 50.125);
+  EXPECT_FALSE(map.extent().uniform_in_x);
+}
+
+TEST(HeightMap, ATipThatOnlyTouchesANodeCounts) {
+  auto triangles = sheet();
+  triangles.push_back({Point{10, 20, 1}, Point{12, 20, 1}, Point{11, 22, 2}});
+  EXPECT_EQ(height_map_of(triangles).height(11, 22), 2);
+}
+
+TEST(HeightMap, SlantedFacesAreExactAtNodesAndLinearBetween) {
+  std::vector<Triangle> triangles;
+  const auto z = [](float x, float y) { return 0.05F * x - 0.02F * y; };
+  const auto at = [&](float x, float y) { return Point{x, y, z(x, y)}; };
+  triangles.push_back({at(0, 0), at(36, 0), at(0, 108)});
+  triangles.push_back({at(36, 0), at(36, 108), at(0, 108)});
+  const HeightMap map = height_map_of(triangles);
+  const double level = map.height(0, 0);  // of (0, 0) above the outline's median
+  for (double x = 0; x <= 36; x += 1.7)
+    for (double y = 0; y <= 108; y += 3.3)
+      EXPECT_NEAR(map.height(x, y) - level, 0.05 * x - 0.02 * y, 1e-3) << x << " " << y;
+}
+
+TEST(HeightMap, OutsideIsFlat) {
+  auto triangles = sheet();
+  add_quad(triangles, {0, 40, 1}, {36, 40, 1}, {36, 50, 1}, {0, 50, 1});
+  const HeightMap map = height_map_of(triangles);
+  EXPECT_EQ(map.height(0, 45), 1);
+  EXPECT_EQ(map.height(36, 45), 1);
+  for (const double x : {-0.01, 36.01, 1e300, std::nan("")}) EXPECT_EQ(map.height(x, 45), 0);
+  EXPECT_EQ(map.height(18, -1), 0);
+  EXPECT_EQ(map.height(18, 109), 0);
+  EXPECT_TRUE(map.extent().uniform_in_x);
+  ASSERT_EQ(map.extent().crests.size(), 1u);
+  EXPECT_NEAR(map.extent().crests[0], 45, 1e-9);
+}
+
+TEST(HeightMap, AFlatPlateHasNoTexture) {
+  const HeightMap map = height_map_of(sheet(3));
+  EXPECT_EQ(map.extent().max_height, 0);
+  EXPECT_EQ(map.extent().texture_begin, 54);
+  EXPECT_EQ(map.extent().texture_end, 54);
+  EXPECT_TRUE(map.extent().crests.empty());
+}
+
+TEST(HeightMap, RefusesOtherSizesHolesAndOverlaps) {
+  auto inches = sheet();
+  for (Triangle& triangle : inches)
+    for (Point& corner : triangle)
+      for (float& value : corner) value /= 25.4F;
+  expect_map_refused(inches, "measures 1.42 x 4.25 mm in x and y, expected 36 x 108");
+  std::vector<Triangle> turned;
+  add_quad(turned, {0, 0, 0}, {108, 0, 0}, {108, 36, 0}, {0, 36, 0});
+  expect_map_refused(turned, "measures 108.00 x 36.00 mm");
+  const std::vector<Triangle> half = {sheet()[0]};
+  expect_map_refused(half, "has holes");
+  std::vector<Triangle> heap;
+  for (int i = 0; i < 300; ++i) heap.push_back(sheet()[0]);
+  expect_map_refused(heap, "cover the plate more than");
+  std::vector<Triangle> point = {{Point{1, 1, 1}, Point{1, 1, 1}, Point{1, 1, 1}}};
+  expect_map_refused(point, "measures 0.00 x 0.00 mm");
+}
+
+const std::vector<std::string>& plates() {
+  static const std::vector<std::string> kNames = {
+      "3_Bumps", "6_Ridges", "4_Waves", "4_Blob", "plain", "ridges4.7h1.3", "bumps6+ridges6+waves6+blobs6"};
+  return kNames;
+}
+
+Plate read(const std::vector<Triangle>& solid, const std::string& name) {
+  return {name, std::make_shared<const HeightMap>(solid, rig::kPlateWidthMm, rig::kPlateLengthMm, name)};
+}
+
+// Every directed edge once, and its opposite once: closed, manifold, facing one way.
+TEST(PlateMesh, EveryEdgeBelongsToTwoTriangles) {
+  for (const std::string& name : plates()) {
+    std::map<std::pair<Point, Point>, int> edges;
+    for (const Triangle& t : mesh_of(Plate::named(name)))
+      for (std::size_t i = 0; i < 3; ++i) ++edges[{t[i], t[(i + 1) % 3]}];
+    for (const auto& [edge, count] : edges) {
+      ASSERT_EQ(count, 1) << name;
+      ASSERT_TRUE(edges.contains({edge.second, edge.first})) << name;
+    }
+  }
+}
+
+// Divergence theorem: positive when the triangles face outwards.
+double volume_of(const std::vector<Triangle>& triangles) {
+  double six = 0;
+  for (const Triangle& t : triangles) {
+    const auto [ax, ay, az] = t[0];
+    const auto [bx, by, bz] = t[1];
+    const auto [cx, cy, cz] = t[2];
+    six += double{ax} * (double{by} * double{cz} - double{bz} * double{cy}) -
+           double{ay} * (double{bx} * double{cz} - double{bz} * double{cx}) +
+           double{az} * (double{bx} * double{cy} - double{by} * double{cx});
+  }
+  return six / 6;
+}
+
+TEST(PlateMesh, VolumeIsThatOfThePlate) {
+  const double block = 36.0 * 108 * 3;
+  EXPECT_NEAR(volume_of(mesh_of(Plate::named("plain"))), block, 0.1);
+  EXPECT_NEAR(volume_of(mesh_of(Plate::named("6_Ridges"))), block + 6 * 0.5 * 2.5 * 2.5 * 36, 0.1);
+  const double bump = std::numbers::pi / 2 * 2.5 * 2.5 * 36;
+  EXPECT_NEAR(volume_of(mesh_of(Plate::named("3_Bumps"))), block + 3 * bump, 0.005 * 3 * bump);
+  const double blob = 2.0 / 3 * std::numbers::pi * 2.5 * 2.5 * 2.5;
+  EXPECT_NEAR(volume_of(mesh_of(Plate::named("4_Blob"))), block + 16 * blob, 0.01 * 16 * blob);
+}
+
+// Written, read and looked at anywhere: what supertac-plate's help states.
+TEST(PlateMesh, WrittenAndReadHeightsAgree) {
+  const RandomStream random(11, 0);
+  for (const std::string& name : plates()) {
+    const Plate plate = Plate::named(name);
+    const Plate again = read(parse_stl(stl_bytes(mesh_of(plate), name), name), name);
+    EXPECT_NEAR(again.max_height(), plate.max_height(), 0.13) << name;  // a ridge's peak between two nodes
+    double squares = 0;
+    const int points = 20'000;
+    for (std::uint64_t i = 0; i < points; ++i) {
+      const double x = 36 * random.uniform(2 * i), y = 108 * random.uniform(2 * i + 1);
+      const double error = again.height(x, y) - plate.height(x, y);
+      ASSERT_LT(std::abs(error), 0.8)
+          << name << " at " << x << " " << y;  // beside the upright foot of a bump
+      squares += error * error;
+    }
+    EXPECT_LT(std::sqrt(squares / points), 0.02) << name;
+  }
+}
+
+TEST(PlateMesh, RigPlatesComeBackExactlyAtTheNodes) {
+  for (const std::string& name : kRigPlates) {
+    const Plate plate = Plate::named(name);
+    const Plate again = read(mesh_of(plate), name);
+    EXPECT_NEAR(again.texture_begin(), plate.texture_begin(), 0.126) << name;
+    EXPECT_NEAR(again.texture_end(), plate.texture_end(), 0.126) << name;
+    EXPECT_EQ(again.uniform_in_x(), plate.uniform_in_x()) << name;
+    for (double y = 0; y <= 108; y += HeightMap::kCellMm)
+      for (double x = 0; x <= 36; x += 1.5)
+        ASSERT_NEAR(again.height(x, y), plate.height(x, y), 1.001e-3) << name << " at " << x << " " << y;
+    ASSERT_EQ(again.crests().size(), plate.crests().size()) << name;
+    for (std::size_t i = 0; i < plate.crests().size(); ++i)
+      EXPECT_NEAR(again.crests()[i], plate.crests()[i], 0.01) << name;
+  }
+}
+
+// A block with upright sides, one with a slope across that is less than what counts as uniform, a hill that
+// ends at the plate's edge: read, written and read again, twice.
+TEST(PlateMesh, APlateThatWasReadIsWrittenAsItIs) {
+  const auto box = [](float from, float to, float low, float high) {
+    const Point a{0, from, low}, b{36, from, high}, c{36, to, high}, d{0, to, low};
+    return std::vector<Triangle>{{a, b, c}, {a, c, d}};
+  };
+  const std::vector<Triangle> ground = box(0, 108, 0, 0);
+  for (const auto& top : {box(40, 50, 2, 2), box(40.05F, 50, 2, 2.04F), box(60, 108, 1, 1)}) {
+    std::vector<Triangle> triangles = ground;
+    triangles.insert(triangles.end(), top.begin(), top.end());
+    const Plate first = read(triangles, "p"), second = read(mesh_of(first), "p");
+    for (double y = 0; y <= 108; y += 0.11)
+      for (double x = 0; x <= 36; x += 0.6)
+        ASSERT_NEAR(second.height(x, y), first.height(x, y), 0.01) << x << " " << y;
+    EXPECT_EQ(second.height(18, 20), 0);
+    EXPECT_EQ(mesh_of(second), mesh_of(first));
+  }
+}
+
+TEST(PlateMesh, UniformPlatesAreSmall) { EXPECT_LT(mesh_of(Plate::named("6_Bumps")).size(), 3000u); }
 
 }  // namespace supertac::stl_test

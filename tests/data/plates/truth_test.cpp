@@ -1,6 +1,7 @@
 #include "data/plates/truth.h"
 
-#include "tests/data/rig_plates.h"
+#include "io/numbers/random.h"
+#include "tests/data/test_recordings.h"
 #include "tests/support/test.h"
 
 namespace supertac::truth_test {
@@ -38,7 +39,7 @@ TEST(Truth, IsZeroOnTheFlatPlateAndOneOnTopOfEveryPlate) {
   EXPECT_NEAR(truth_value(bumps, 5, 42), 1, 1e-12);
   EXPECT_EQ(truth_value(bumps, 5, 30), 0);
   for (double y = 20; y < 90; y += 0.77)
-    for (const std::string name : kRigPlates) {
+    for (const auto& name : kRigPlates) {
       const Plate plate = Plate::named(name);
       const double v = truth_value(plate, 7, y);
       EXPECT_GE(v, plate.min_height() < 0 ? -1 : 0) << name;
@@ -87,6 +88,41 @@ TEST(Truth, RefusesAnImageOfTheWrongSize) {
             }),
             "truth_image: expected a picture of 1x1 pixels or more and room for all, got 0x0 pixels and room "
             "for 0");
+}
+
+constexpr std::size_t kPixels = 64, kTruths = 200;
+
+// Of so many frames the first is pressed by 0.3 and more on a quarter of the pixels.
+std::vector<float> film(double noise, double rest, std::size_t of = 2) {
+  const RandomStream random(1, 0);
+  std::vector<float> truth;
+  for (std::size_t f = 0; f < kTruths; ++f)
+    for (std::size_t p = 0; p < kPixels; ++p) {
+      const double pressed = f % of == 0 && p < kPixels / 4 ? 0.3 + 0.5 * random.uniform(f) : 0;
+      truth.push_back(static_cast<float>(
+          std::clamp(rest + pressed + noise * random.normal(1000 + f * kPixels + p), 0.0, 1.0)));
+    }
+  return truth;
+}
+
+TEST(ContactLevel, TellsTheFilmsNoiseFromATouch) {
+  for (const double rest : {0.0, 0.03, 0.2}) {
+    const std::vector<float> truth = film(0.005, rest);
+    const float level = contact_level(truth, kPixels);
+    EXPECT_GT(level - rest, 0.005) << rest;
+    EXPECT_LT(level - rest, 0.05) << rest;
+    for (std::size_t f = 0; f < kTruths; ++f) {
+      const auto first = truth.begin() + static_cast<std::ptrdiff_t>(f * kPixels);
+      EXPECT_EQ(*std::max_element(first, first + kPixels) > level, f % 2 == 0) << f;
+    }
+  }
+}
+
+TEST(ContactLevel, IsZeroWhereNothingRests) {
+  EXPECT_EQ(contact_level(film(0, 0), kPixels), 0);
+  EXPECT_EQ(contact_level(film(0, 0.5), kPixels), 0.5F) << "rests, but not at 0";
+  EXPECT_EQ(contact_level(film(0, 0, 1), kPixels), 0) << "never at rest";
+  EXPECT_EQ(contact_level(std::vector<float>(5 * kPixels, 0.02F), kPixels), 0) << "too few frames to tell";
 }
 
 }  // namespace supertac::truth_test

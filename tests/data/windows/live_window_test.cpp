@@ -1,7 +1,7 @@
 #include "data/windows/live_window.h"
 
 #include "data/simulation/simulator.h"
-#include "data/windows/transforms/normalise_window.h"
+#include "data/windows/transforms.h"
 #include "data/windows/windows.h"
 #include "io/numbers/random.h"
 #include "tests/data/test_recordings.h"

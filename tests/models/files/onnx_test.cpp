@@ -1,5 +1,5 @@
 #include "models/files/onnx.h"
-#include "data/windows/transforms/normalise_window.h"
+#include "data/windows/transforms.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/hash.h"
 #include "models/files/onnx_file.h"

@@ -3,7 +3,7 @@
 #include <omp.h>
 
 #include "autograd/kernels/fast/isa/isa.h"
-#include "data/windows/transforms/augment.h"
+#include "data/windows/transforms.h"
 #include "io/files/json.h"
 #include "io/numbers/hash.h"
 #include "models/inference/evaluation.h"
