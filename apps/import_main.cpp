@@ -13,7 +13,7 @@
 #include "apps/import/tables.h"
 #include "apps/import/text_folder.h"
 #include "data/plates/plate.h"
-#include "data/recordings/imports/table_import.h"
+#include "data/recordings/imports/imports.h"
 #include "io/files/safetensors.h"
 
 namespace supertac {

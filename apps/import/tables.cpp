@@ -12,8 +12,7 @@
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "data/plates/plate.h"
-#include "data/recordings/imports/film_truth.h"
-#include "data/recordings/imports/table_import.h"
+#include "data/recordings/imports/imports.h"
 #include "data/registration/registration.h"
 #include "io/numbers/numbers.h"
 

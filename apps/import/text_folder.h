@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "data/plates/plate.h"
-#include "data/recordings/imports/text_import.h"
+#include "data/recordings/imports/imports.h"
 #include "data/registration/registration.h"
 #include "io/files/file.h"
 

@@ -25,12 +25,12 @@ struct Rate {
   double uncertain = 0;  ///< a share: how far off the period may be
 };
 
-/// How late the reads of a stream come.
+/// How late the reads of a stream come, as the second assumption of frame_clock.h has it.
 struct Lateness {
-  double jitter_s = 0;  ///< one in ten is later, of these one in ten later than twice that, and so on
-  double waited_s = 0;  ///< so long at most a frame waits that the read in front of it did not take
-  bool known = false;
-  double unsure = 1;  ///< so many times as late the earliest of some reads may be: few have been seen
+  double jitter_s = 0;  ///< J: one read in ten is later, one in a hundred later than 2 J, and so on
+  double waited_s = 0;  ///< longest time that a frame waits in a port after the read before its own
+  bool known = false;   ///< enough reads were seen to tell
+  double unsure = 1;    ///< factor on J where few reads told it: 1 + 32 / n of n reads
 };
 
 namespace clock_model {

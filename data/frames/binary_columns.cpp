@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 
 #include "data/frames/binary_decoder.h"
 #include "data/frames/probe.h"
@@ -69,22 +68,22 @@ double bits_of_size(double x) {
   return std::isfinite(x) ? std::max(0.0, std::abs(std::log2(std::abs(x))) - 24) : 128;
 }
 
-template <class Unsigned>
-Unsigned load(const unsigned char* bytes, bool big_endian) {
-  Unsigned value = 0;
-  for (std::size_t i = 0; i < sizeof value; ++i)
-    value = static_cast<Unsigned>(value << 7 << 1 | bytes[big_endian ? i : sizeof value - 1 - i]);
-  return value;
+// The number of `width` bytes, 8 at most, at `bytes`.
+std::uint64_t load(const unsigned char* bytes, std::size_t width, bool big_endian) {
+  return bits_at(reinterpret_cast<const std::byte*>(bytes), width, big_endian);
 }
 
 // Numbers in their order: real numbers as how many there are up to 0.
-template <class Number>
-std::int64_t ordinal(std::make_unsigned_t<Number> bits) {
-  return std::int64_t{static_cast<Number>(bits)};
-}
-std::int64_t ordinal_of_real(std::uint32_t bits) {
-  const std::int64_t size = bits & 0x7FFFFFFF;
-  return bits >> 31 != 0 ? -size : size;
+std::vector<std::int64_t> ordinals(std::span<const std::uint32_t> words, const std::string& type) {
+  const std::int64_t above = std::int64_t{1} << (8 * bytes_of(type));
+  const bool is_real = type == "f32", is_signed = type.front() == 'i';
+  std::vector<std::int64_t> numbers(words.begin(), words.end());
+  for (std::int64_t& number : numbers)
+    if (number >= above / 2 && is_signed)
+      number -= above;
+    else if (number >= above / 2 && is_real)
+      number = above / 2 - number;
+  return numbers;
 }
 
 // A column read as numbers: bits of its steps in time, and of a number in its middle, for what came first may
@@ -94,24 +93,23 @@ struct Column {
   std::int64_t middle = 0;
   bool still = false, high = false, highs = false;  // its highest bit is set at times, in several numbers
 };
-template <class Unsigned, class Ordinal>
-Column column_of(const unsigned char* first, std::size_t stride, std::size_t steps, bool big_endian,
-                 const Ordinal& ordinal, bool two_levels = false) {
-  constexpr std::size_t kBits = 8 * sizeof(Unsigned);
+// `words`: what stands in the column, row by row.
+Column column_of(std::span<const std::uint32_t> words, const std::string& type) {
+  const std::size_t steps = words.size() - 1, bits_wide = 8 * bytes_of(type);
+  const std::vector<std::int64_t> numbers = ordinals(words, type);
   // Far is far.
-  const auto class_of = [](std::int64_t step) {
+  const auto class_of = [&](std::int64_t step) {
     const int size = std::bit_width(static_cast<std::uint64_t>(std::abs(step)));
-    return size + 2 > static_cast<int>(kBits) ? kBits : static_cast<std::size_t>(size);
+    return static_cast<std::size_t>(size) + 2 > bits_wide ? bits_wide : static_cast<std::size_t>(size);
   };
   Classes counts{}, on_level{};
-  Column column{.middle = ordinal(load<Unsigned>(first + steps / 2 * stride, big_endian))};
-  std::int64_t before = ordinal(load<Unsigned>(first, big_endian)), levels[2] = {before, before};
+  Column column{.middle = numbers[steps / 2]};
+  std::int64_t before = numbers[0], levels[2] = {before, before};
   double turns[2][2] = {};
   bool high_before = false;
   for (std::size_t k = 0; k <= steps; ++k) {
-    const auto bits = load<Unsigned>(first + k * stride, big_endian);
-    const bool high = bits >> (kBits - 1) != 0;
-    const std::int64_t now = ordinal(bits);
+    const bool high = words[k] >> (bits_wide - 1) != 0;
+    const std::int64_t now = numbers[k];
     column.highs = column.highs || (high && column.high && now != levels[1]);
     column.high = column.high || high;
     if (k > 0)
@@ -121,21 +119,20 @@ Column column_of(const unsigned char* first, std::size_t stride, std::size_t ste
   column.steps = bits_of_steps(counts, steps), column.still = counts[0] == steps;
   // Saturation and glitches of bytes are jumps between two levels, and back. With a sign they may look like
   // small steps across 0 as well, so both readings have both explanations.
-  if (two_levels && column.high)
+  if (bits_wide == 8 && column.high)
     column.steps = std::min(column.steps,
-                            static_cast<double>(kBits) + bits_of_share(turns[0][0], turns[0][1]) +
+                            static_cast<double>(bits_wide) + bits_of_share(turns[0][0], turns[0][1]) +
                                 bits_of_share(turns[1][0], turns[1][1]) + bits_of_classes(on_level, steps));
-  column.alone = std::log2(kBits + 1.0) + std::bit_width(static_cast<std::uint64_t>(std::abs(column.middle)));
+  column.alone = std::log2(static_cast<double>(bits_wide) + 1) +
+                 std::bit_width(static_cast<std::uint64_t>(std::abs(column.middle)));
   column.size = bits_of_size(static_cast<double>(column.middle));
   return column;
 }
 
 // Real numbers may all be multiples of one, such as whole numbers.
-void look_at_multiples(Column& column, const unsigned char* first, std::size_t stride, std::size_t steps,
-                       bool big_endian) {
-  const auto value = [&](std::size_t k) {
-    return std::bit_cast<float>(load<std::uint32_t>(first + k * stride, big_endian));
-  };
+void look_at_multiples(Column& column, std::span<const std::uint32_t> words) {
+  const std::size_t steps = words.size() - 1;
+  const auto value = [&](std::size_t k) { return std::bit_cast<float>(words[k]); };
   const auto finite = [&](std::size_t k) { return std::isfinite(value(k)); };
   column.size = bits_of_size(double{value(steps / 2)});
   int finest = 127;
@@ -185,18 +182,13 @@ void BinaryColumns::find_constants() {
 
 void BinaryColumns::find_values() {
   const std::size_t period = stretch_.period;
-  const auto read = [&](const std::string& type, const unsigned char* first, bool big) {
-    if (type == "f32") {
-      Column column = column_of<std::uint32_t>(first, period, steps_, big, ordinal_of_real);
-      look_at_multiples(column, first, period, steps_, big);
-      return column;
-    }
-    return type == "u8"    ? column_of<std::uint8_t>(first, period, steps_, big, ordinal<std::uint8_t>, true)
-           : type == "i8"  ? column_of<std::uint8_t>(first, period, steps_, big, ordinal<std::int8_t>, true)
-           : type == "u16" ? column_of<std::uint16_t>(first, period, steps_, big, ordinal<std::uint16_t>)
-           : type == "i16" ? column_of<std::uint16_t>(first, period, steps_, big, ordinal<std::int16_t>)
-           : type == "u32" ? column_of<std::uint32_t>(first, period, steps_, big, ordinal<std::uint32_t>)
-                           : column_of<std::uint32_t>(first, period, steps_, big, ordinal<std::int32_t>);
+  const auto read = [&](const std::string& type, std::size_t width, std::size_t column, bool big) {
+    std::vector<std::uint32_t> words(steps_ + 1);
+    for (std::size_t k = 0; k <= steps_; ++k)
+      words[k] = static_cast<std::uint32_t>(load(at(k, column), width, big));
+    Column numbers = column_of(words, type);
+    if (type == "f32") look_at_multiples(numbers, words);
+    return numbers;
   };
   for (const char* type : {"u8", "i8", "u16", "i16", "u32", "i32", "f32"})
     for (const bool big : {false, true}) {
@@ -205,7 +197,7 @@ void BinaryColumns::find_values() {
       Values v{type, big, width};
       std::vector<Column> columns(period);
       for (std::size_t c = 0; c < period; ++c) {
-        columns[c] = read(type, at(0, c), big);
+        columns[c] = read(type, width, c, big);
         v.high.push_back(columns[c].high), v.highs.push_back(columns[c].highs || columns[c].still);
         v.alone.push_back(columns[c].alone);
         v.random.push_back(columns[c].steps > static_cast<double>(8 * width * steps_));
@@ -239,14 +231,9 @@ double BinaryColumns::Values::bits(std::size_t at, std::size_t count) const {
 void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_endian, double seconds,
                                 bool real) {
   const std::string type = (real ? "f" : "u") + std::to_string(8 * width);
-  const auto* first = at(0, column);
   const auto number = [&](std::size_t k) {
-    const auto* from = first + k * stretch_.period;
-    return width == 1   ? std::uint64_t{*from}
-           : width == 2 ? std::uint64_t{load<std::uint16_t>(from, big_endian)}
-           : width == 4 ? std::uint64_t{load<std::uint32_t>(from, big_endian)}
-           : real       ? microseconds(std::bit_cast<double>(load<std::uint64_t>(from, big_endian)))
-                        : load<std::uint64_t>(from, big_endian);
+    const std::uint64_t bits = load(at(k, column), width, big_endian);
+    return real ? microseconds(std::bit_cast<double>(bits)) : bits;
   };
   const std::uint64_t mask = width == 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << 8 * width) - 1;
   const double begin = std::bit_width(number(0));
@@ -336,13 +323,11 @@ void BinaryColumns::find_fields(double seconds) {
 bool BinaryColumns::is_checksum(const std::string& kind, bool big_endian, std::size_t begin,
                                 std::size_t end) const {
   const std::size_t width = checksum_bytes(kind), rows = steps_ + (end + width > stretch_.period ? 0 : 1);
-  std::vector<double> seen;
+  std::vector<std::uint32_t> seen;
   std::size_t right = 0;
   for (std::size_t k = 0; k < rows; ++k) {
     const auto *from = at(k, begin), *place = at(k, end);
-    const double sent = width == 1   ? *place
-                        : width == 2 ? load<std::uint16_t>(place, big_endian)
-                                     : load<std::uint32_t>(place, big_endian);
+    const auto sent = static_cast<std::uint32_t>(load(place, width, big_endian));
     if (sent == checksum_of(kind, std::as_bytes(std::span(from, end - begin)))) {
       ++right;
       if (seen.size() < 8 && std::ranges::find(seen, sent) == seen.end()) seen.push_back(sent);

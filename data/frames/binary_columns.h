@@ -19,8 +19,10 @@ using Bytes = std::span<const unsigned char>;
 inline constexpr double kNever = std::numeric_limits<double>::infinity();  ///< bits of what is not so
 inline constexpr std::size_t kClasses = 34;                                ///< of powers of two
 
-/// Bits of which of `a + b` events were of one kind and which of the other, each as likely as those before
-/// say (Krichevsky and Trofimov): of sequences of two kinds, whatever share they have.
+/// Bits that tell which of a + b events were of one kind (a of them) and which of the other (b), where each
+/// is expected as often as those before it say: after i of one kind and j of the other, the next is of the
+/// first with p = (i + 1/2) / (i + j + 1) (Krichevsky and Trofimov 1981). The product of all p gives
+///   -log2 p(a, b) = log2( G(a + b + 1) G(1/2)^2 / (G(a + 1/2) G(b + 1/2)) ),   G the gamma function
 double bits_of_share(double a, double b);
 
 /// The periods, in bytes, that may be frames: those after which more bytes return than after others, the

@@ -7,13 +7,6 @@
 namespace supertac {
 namespace {
 
-std::uint64_t bits_at(const std::byte* bytes, std::size_t count, bool big_endian) {
-  std::uint64_t bits = 0;
-  for (std::size_t i = 0; i < count; ++i)
-    bits = bits << 8 | std::to_integer<std::uint64_t>(bytes[big_endian ? i : count - 1 - i]);
-  return bits;
-}
-
 constexpr std::size_t kMostReturns = 8;
 
 /// A remainder of division by a polynomial.
@@ -56,6 +49,13 @@ constexpr Crc kCrcs[] = {{"crc8", 8, 0x07, 0, false, 0},
 std::span<const std::byte> bytes_in(const std::string& text) { return std::as_bytes(std::span(text)); }
 
 }  // namespace
+
+std::uint64_t bits_at(const std::byte* bytes, std::size_t count, bool big_endian) {
+  std::uint64_t bits = 0;
+  for (std::size_t i = 0; i < count; ++i)
+    bits = bits << 8 | std::to_integer<std::uint64_t>(bytes[big_endian ? i : count - 1 - i]);
+  return bits;
+}
 
 std::size_t bytes_of(const std::string& type) {
   return static_cast<std::size_t>(std::stoi(type.substr(1))) / 8;  // "u16"

@@ -8,6 +8,8 @@
 
 namespace supertac {
 
+/// The `count` bytes that begin at `bytes`, 8 at most, as one whole number.
+std::uint64_t bits_at(const std::byte* bytes, std::size_t count, bool big_endian);
 /// Size in bytes of a number of this FrameFormat::type or FrameTime::type; and the number that begins at
 /// `bytes`.
 std::size_t bytes_of(const std::string& type);

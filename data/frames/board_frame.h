@@ -15,9 +15,6 @@
 
 namespace supertac {
 
-constexpr std::byte kFrameHeader{0x24};
-constexpr std::byte kFrameTrailer{0x21};
-
 struct BoardFrame {
   std::array<std::uint16_t, rig::kFrameSamples> samples{};
   std::uint16_t slip = 0;
@@ -29,38 +26,18 @@ struct BoardFrame {
   }
 };
 
-/// The finger's taxels in volts, rig::volts_of() in single precision.
-std::array<float, rig::kTaxels> taxel_volts(const BoardFrame& frame);
-
-/// True when `bytes` (at least 164) starts with a header, 81 high bytes <= 0x0F and a trailer.
-bool is_frame(const std::byte* bytes);
-
-/// The frame at `bytes`; is_frame(bytes) must hold.
-BoardFrame parse_frame(const std::byte* bytes);
-
 /// Writes the 164 bytes of `frame`. Throws std::invalid_argument for a sample above 4095.
 void write_frame(const BoardFrame& frame, std::span<std::byte, rig::kFrameBytes> out);
 
-/// How many frames the `discarded` bytes between two whole frames were. A byte or two too many or too few are
-/// a cable's errors.
-std::uint32_t damaged_frames(std::uint64_t discarded);
-
-/// Flags physically implausible jumps: a taxel that moves more than 124 ADC steps, 0.1 V, between two frames,
-/// in which the finger moves 0.01 mm at 10 mm/s. A flipped bit in a sample passes every check of the format;
-/// only this can show it.
-class JumpDetector {
- public:
-  bool jump(const BoardFrame& frame);
-
- private:
-  std::array<int, rig::kTaxels> last_{};
-  int flagged_ = 0;
-  bool first_ = true;
-};
-
-/// Finds the board's frames in its byte stream. On a failed check it looks again from the NEXT BYTE: at 1e-3
-/// dropped bytes a reader that skips whole frames loses 16-87 % of the undamaged ones, this one none. A
-/// flipped bit inside a sample cannot be detected, the format has no checksum: see JumpDetector.
+/// Finds the board's frames in its byte stream: a header, 81 high bytes <= 0x0F and a trailer. On a failed
+/// check it looks again from the NEXT BYTE: at 1e-3 dropped bytes a reader that skips whole frames loses
+/// 16-87 % of the undamaged ones, this one none. Values are the finger's taxels in volts, rig::volts_of() in
+/// single precision. Bytes between two whole frames count as damaged frames; a byte or two too many or too
+/// few are a cable's errors.
+///
+/// A flipped bit inside a sample passes every check of the format. DecodedFrame::jump flags a taxel that
+/// moves more than 124 ADC steps, 0.1 V, between two frames, in which the finger moves 0.01 mm at 10 mm/s;
+/// three such frames in a row are a change of the world.
 class BoardDecoder : public BinaryDecoder {
  public:
   BoardDecoder();
@@ -68,11 +45,14 @@ class BoardDecoder : public BinaryDecoder {
   const BoardFrame& frame() const { return frame_; }
 
  private:
-  bool is_frame(const std::byte* start) const override { return supertac::is_frame(start); }
+  bool is_frame(const std::byte* start) const override;
   void hand_over(const std::byte* start, const Sink& sink) override;
+  bool jumps();
 
   BoardFrame frame_;
-  JumpDetector jumps_;
+  std::array<int, rig::kTaxels> before_{};  // the taxels of the last frame that was no jump
+  int jumps_ = 0;                           // frames in a row that were
+  bool first_ = true;
 };
 
 }  // namespace supertac

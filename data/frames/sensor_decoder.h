@@ -17,7 +17,7 @@ struct DecodedFrame {
   std::optional<double> time_s;   ///< of the sensor's clock, where it sends one
   std::uint32_t damaged = 0;      ///< frames between the one before and this one that came, but not whole
   bool suspect = false;           ///< it stands behind bytes that were no frame
-  bool jump = false;              ///< implausible change of a taxel (JumpDetector)
+  bool jump = false;              ///< implausible change of a taxel (BoardDecoder)
 };
 
 class SensorDecoder {

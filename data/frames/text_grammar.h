@@ -46,11 +46,15 @@ std::optional<TextChecksum> checksum_of(std::string_view line);
 
 enum class Commas { lists, points, doubt, thousands };
 
-/// Whether marks (',' or '.') glued between digits, "1,5", are points. They are not where "," also parts such
-/// numbers. What stands behind a point is digits. Of places where they have one width w > 1 some begin with
-/// 0, as a number behind a comma does not, for which the first digits of many are all others; of one digit
-/// all ten come; of places with several widths none end in 0, as some numbers do. What fits neither is a
-/// doubt. Places that have three such digits or none part thousands.
+/// Whether marks (',' or '.') glued between digits are decimal points, "1,5 2,75", or part the numbers of a
+/// list, "1,5,2,75". It is told from what stands behind the mark at one place of many lines:
+///   "1,5,2,75"              a list: "," also parts what would be the numbers 1.5 and 2.75
+///   "3,07" "3,98" "3,40"    points: all have two digits, and some begin with 0, as no number of a list does
+///   "3,17" "3,98" "3,40"    a list: all have two digits, of which the first is never 0, but any other
+///   "3,0" "3,1" ... "3,9"   points: all have one digit, and all ten come
+///   "3,5" "3,25" "3,125"    points: of several widths none ends in 0, as some numbers of a list do
+///   "1,250" beside "980"    thousands: three digits behind a mark, or no mark
+/// What fits neither points nor lists, or both, is a doubt.
 Commas commas_of(const std::vector<std::string>& lines, char mark);
 
 /// Whether blanks within the cells of a list part thousands.

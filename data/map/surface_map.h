@@ -41,7 +41,7 @@ struct MapCells {
 /// variances 1 / w (Aitken 1935). The errors of overlapping pictures are nearly the same, so they are
 /// averaged and not divided by the number of pictures.
 ///
-/// Causal: what values() gives between two pictures uses no later one. Smoothed: the same when all have come.
+/// Causal: what cells() gives between two pictures uses no later one. Smoothed: the same when all have come.
 /// The same pictures in the same order give the same bits. One object serves one thread.
 class SurfaceMap {
  public:

@@ -1,3 +1,4 @@
+// A pass of a finger, or presses of an array, as they were recorded; and its file.
 #pragma once
 
 #include <cstddef>
@@ -36,7 +37,7 @@ struct Recording {
   std::size_t frames() const { return time_s.size(); }
   /// Between two frames: the median, since lost frames leave gaps; 0 of fewer than two.
   double period_s() const;
-  /// Length of the moving average the voltages went through (s); 0 when the metadata names none.
+  /// Length of the moving average that the signals went through (s); 0 when the metadata names none.
   double filter_s() const;
   /// Wall-clock time of time_s 0 (s since 1970); NaN when the metadata name none ("began_s").
   double began_s() const;
@@ -45,16 +46,16 @@ struct Recording {
 /// Converts the signals to another unit, polarity and range.
 void restate(Recording& recording, const SignalScale& scale);
 
-/// Reads a safetensors file with tensors time_s F64 [n], volts F32 [n,signals] and, where known,
-/// position_mm F32 [n,2], lift_mm F32 [n] and truth F32 [n,height,width]. Metadata "array" says what the
-/// signals are, {"rows": 6, "columns": 6, "pitch_mm": 2, "channels": 1}
-/// (pitch_mm may be [x, y]); without it they are the rig's 4x4
-/// taxels at 3 mm. Metadata "signals" says what they mean, {"unit": "counts", "pressed": "higher", "range":
-/// [40, 900]}; without it they are the rig's volts. Metadata "body" is that of a sensor's file. Throws
-/// FileError when the file is damaged (io/files/safetensors.h), is no recording, or breaks a rule of
-/// Recording: sizes that do not match, values that are not finite (position_mm may be NaN), a truth outside
-/// [0,1], an unknown tensor, time stamps that do not increase, a speed outside 0 to 1e4 mm/s, a moving
-/// average (metadata "filter_s") outside 0 to 10 s, or a time (also metadata "began_s") beyond 1e10 s.
+/// Reads a safetensors file with tensors time_s F64 [n], signals F32 [n,signals] (volts, where they are
+/// volts: signals_tensor()) and, where known, position_mm F32 [n,2], lift_mm F32 [n] and truth F32
+/// [n,height,width]. Metadata "array" says how the taxels lie, {"rows": 6, "columns": 6, "pitch_mm": 2,
+/// "channels": 1} (pitch_mm may be [x, y]); without it they are the rig's 4x4 taxels at 3 mm. Metadata
+/// "signals" says what the numbers mean, {"unit": "counts", "pressed": "higher", "range": [40, 900]}; without
+/// it they are the rig's volts. Metadata "body" is that of a sensor's file. Throws FileError when the file is
+/// damaged (io/files/safetensors.h), is no recording, or breaks a rule of Recording: sizes that do not match,
+/// values that are not finite (position_mm may be NaN), a truth outside [0,1], an unknown tensor, time stamps
+/// that do not increase, a speed outside 0 to 1e4 mm/s, a moving average (metadata "filter_s") outside 0 to
+/// 10 s, or a time (also metadata "began_s") beyond 1e10 s.
 Recording read_recording(const std::string& path);
 /// The same from a file that has been read.
 Recording recording_of(const SafetensorsFile& file);

@@ -1,3 +1,5 @@
+// Where the finger was in a real pass: its contacts are laid onto the elements of the plate, and the passes
+// of one plate onto each other.
 #pragma once
 
 #include <span>

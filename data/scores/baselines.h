@@ -1,3 +1,4 @@
+// What pictures simple methods draw, beside which a network is scored.
 #pragma once
 
 #include <cstdint>
@@ -52,9 +53,10 @@ class Bicubic {
   std::vector<float> down_, across_;  // [pixels][taxels]: weights of the taxels of a line on its pixels
 };
 
-/// Bicubic interpolation of the frame that a window shows (the mean of each taxel's channels), followed by a
-/// x + b: the line that fits the targets of the training examples best (least squares over all pixels). It
-/// turns voltage into height as well as two numbers can.
+/// a x + b, where x is the bicubic interpolation of the frame that a window shows (the mean of each taxel's
+/// channels), with the line of least squares over all pixels of the training examples, whose targets are y:
+///   a = cov(x, y) / var(x), 0 where x never changes;   b = mean(y) - a mean(x)
+/// It turns signal into height as well as two numbers can.
 class UpsampledFrame : public Baseline {
  public:
   /// Throws std::invalid_argument when train is empty.

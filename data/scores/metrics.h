@@ -1,3 +1,4 @@
+// How near pictures come to their truths: each picture's scores, and their means over a set of windows.
 #pragma once
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// By how much two images are displaced against each other.
 #pragma once
 
 #include <complex>

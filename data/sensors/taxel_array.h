@@ -1,3 +1,4 @@
+// What an array of taxels is, and how a picture of it divides into pixels.
 #pragma once
 
 #include <cstddef>

@@ -1,3 +1,4 @@
+// The rig's finger, or that of another array, slides over a plate: what its taxels would show.
 #pragma once
 
 #include <cstdint>
@@ -54,7 +55,8 @@ struct FingerIdentity {
 };
 
 /// The finger's voltages over a plate, one per taxel: contact of an elastic pad on a yielding mount, then the
-/// sensor. A pure function of pose and time, used alike by the simulator and by the virtual rig.
+/// sensor. A pure function of pose and time, used alike by the simulator and by the virtual rig. Lengths,
+/// indentations and loads are in mm, slopes in mm per mm, times in s, signals in V; stiffness is in mm^2.
 ///
 /// A point u of the pad, 2 mm apart across and 0.25 mm along the slide and up to 3.5 and 6.5 mm beyond the
 /// outermost taxels, is indented by

@@ -1,3 +1,4 @@
+// In which order an epoch of training takes its windows.
 #pragma once
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// A network's window of the newest frames, as a sensor sends them.
 #pragma once
 
 #include <cstddef>

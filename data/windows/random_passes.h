@@ -1,3 +1,4 @@
+// Simulated passes that training sees beside recorded ones.
 #pragma once
 
 #include <cstdint>

@@ -19,12 +19,7 @@ namespace {
 constexpr double kTestShare = 0.2;
 constexpr std::uint64_t kWindowStream = 0, kPlateStream = 1, kPassStream = 2, kHeldOutStream = 1;
 
-constexpr std::array<std::pair<const char*, SplitKind>, 6> kNames{{{"window", SplitKind::window},
-                                                                   {"pass", SplitKind::pass},
-                                                                   {"trial", SplitKind::trial},
-                                                                   {"texture", SplitKind::texture},
-                                                                   {"group", SplitKind::group},
-                                                                   {"none", SplitKind::none}}};
+constexpr const char* kNames[] = {"window", "pass", "trial", "texture", "group", "none"};  // by SplitKind
 
 enum class Side : std::uint8_t { neither, train, test };
 
@@ -154,17 +149,14 @@ Split split_by_pass(const WindowSet& windows, const std::vector<Side>& sides) {
 }  // namespace
 
 SplitKind split_kind(const std::string& name) {
-  for (const auto& [known, kind] : kNames)
-    if (name == known) return kind;
-  throw std::invalid_argument("split: expects window, pass, trial, texture, group or none, got '" + name +
-                              "'");
+  const auto found = std::ranges::find(kNames, name);
+  if (found == std::end(kNames))
+    throw std::invalid_argument("split: expects window, pass, trial, texture, group or none, got '" + name +
+                                "'");
+  return static_cast<SplitKind>(found - std::begin(kNames));
 }
 
-std::string name_of(SplitKind kind) {
-  for (const auto& [name, known] : kNames)
-    if (kind == known) return name;
-  throw std::invalid_argument("split: unknown kind");
-}
+std::string name_of(SplitKind kind) { return kNames[static_cast<std::size_t>(kind)]; }
 
 Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
                  const std::vector<std::string>& leave_out) {

@@ -277,24 +277,27 @@ Track WindowSet::track(std::size_t pass) const {
   return track;
 }
 
+// From so many frames before the last one of a window on.
+void WindowSet::read_samples(std::size_t i, std::size_t frames_back, std::span<float> out) const {
+  const Place place = place_of(i);
+  file_->read(stored_[place.pass].samples + (place.last - frames_back) * array().signals(), out);
+}
+
 void WindowSet::window(std::size_t i, std::span<float> out) const {
   check_size("a window", out.size(), input_size());
-  const Place place = place_of(i);
-  file_->read(stored_[place.pass].samples + (place.last + 1 - frames()) * array().signals(), out);
+  read_samples(i, frames() - 1, out);
   if (settings_.scaling.per_window) normalise_window(out, array().signals());
 }
 
 std::vector<float> WindowSet::window(std::size_t i) const {
   std::vector<float> values(input_size());
-  const Place place = place_of(i);
-  file_->read(stored_[place.pass].samples + (place.last + 1 - frames()) * array().signals(), values);
+  read_samples(i, frames() - 1, values);
   return values;
 }
 
 std::vector<float> WindowSet::shown_frame(std::size_t i) const {
   std::vector<float> values(array().signals());
-  const Place place = place_of(i);
-  file_->read(stored_[place.pass].samples + (place.last - delay_frames()) * array().signals(), values);
+  read_samples(i, delay_frames(), values);
   return values;
 }
 

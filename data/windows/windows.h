@@ -1,3 +1,4 @@
+// Recordings as examples for a network: windows of the last T samples, each with its truth.
 #pragma once
 
 #include <array>
@@ -23,7 +24,7 @@ struct WindowSettings {
   int scale = 4;                         ///< 2, 4, 8 or 16: truths that many times finer than the array
   double rate_hz = 300;                  ///< the model's rate
   double delay_s = 0;                    ///< by how much what a window shows is older than its last frame
-  Scaling scaling = {};                  ///< volts to [0,1]
+  Scaling scaling = {};                  ///< signals to [0,1]
   std::optional<TaxelArray> array = {};  ///< that every recording must have; nothing: that of the first
   std::optional<SignalScale> signal_scale = {};  ///< likewise, its unit and polarity
   std::optional<Body> body = {};                 ///< of what is simulated beside them: that of the first
@@ -186,6 +187,7 @@ class WindowSet {
   void store(const Recording& recording, const Track& track, Stored& stored);
   Place place_of(std::size_t i) const;
   std::array<float, 3> finger(const Place& place) const;
+  void read_samples(std::size_t i, std::size_t frames_back, std::span<float> out) const;
 
   WindowSettings settings_;
   WindowCounts counts_;

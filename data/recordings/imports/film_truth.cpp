@@ -1,4 +1,4 @@
-#include "data/recordings/imports/film_truth.h"
+#include "data/recordings/imports/imports.h"
 
 #include <algorithm>
 #include <array>

@@ -3,8 +3,7 @@
 #include <cstring>
 #include <map>
 
-#include "data/recordings/imports/film_truth.h"
-#include "data/recordings/imports/table_import.h"
+#include "data/recordings/imports/imports.h"
 #include "data/recordings/resample.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"

@@ -1,4 +1,4 @@
-#include "data/recordings/imports/table_import.h"
+#include "data/recordings/imports/imports.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "data/recordings/imports/text_import.h"
+#include "data/recordings/imports/imports.h"
 
 #include <array>
 #include <string_view>

@@ -10,7 +10,7 @@
 #include "data/clock/frame_clock.h"
 #include "data/frames/board_frame.h"
 #include "data/frames/sensor_decoder.h"
-#include "data/recordings/imports/table_import.h"
+#include "data/recordings/imports/imports.h"
 #include "data/recordings/recording.h"
 #include "data/scores/baselines.h"
 #include "data/sensors/rest_tracker.h"

@@ -57,39 +57,50 @@ TEST(BoardFrame, LayoutIsThatOfTheBoard) {
   EXPECT_EQ(bytes[162], std::byte{0xED});
   EXPECT_EQ(bytes[163], std::byte{0x21});
   EXPECT_EQ(frame.taxel(6), 0x0123);
-  EXPECT_TRUE(is_frame(bytes.data()));
-  EXPECT_EQ(parse_frame(bytes.data()), frame);
-  EXPECT_EQ(taxel_volts(frame)[6], 0x0123 * (3.3F / 4096));
+  BoardDecoder decoder;
+  decoder.push(bytes, [](const DecodedFrame& found) { EXPECT_EQ(found.values[6], 0x0123 * (3.3F / 4096)); });
+  EXPECT_EQ(decoder.frame(), frame);
 }
 
 TEST(BoardFrame, EveryHighByteIsChecked) {
   for (std::size_t at = 1; at <= 161; at += 2) {
     auto bytes = frame_bytes(random_frame(1));
     bytes[at] |= std::byte{0x10};
-    EXPECT_FALSE(is_frame(bytes.data())) << "high byte at " << at;
+    BoardDecoder decoder;
+    EXPECT_TRUE(decode_board(decoder, bytes, 164).empty()) << "high byte at " << at;
   }
 }
 
-TEST(BoardFrame, DiscardedBytesAreFramesUpToAFewOfACable) {
-  EXPECT_EQ(damaged_frames(0), 0U);
-  EXPECT_EQ(damaged_frames(1), 0U);
-  EXPECT_EQ(damaged_frames(80), 1U);
-  for (const std::uint64_t bytes : {163U, 164U, 165U}) EXPECT_EQ(damaged_frames(bytes), 1U);
-  EXPECT_EQ(damaged_frames(327), 2U);
+TEST(BoardDecoder, DiscardedBytesAreFramesUpToAFewOfACable) {
+  for (const auto& [bytes, frames] :
+       {std::pair(0U, 0U), {1U, 0U}, {80U, 1U}, {163U, 1U}, {164U, 1U}, {165U, 1U}, {327U, 2U}}) {
+    BoardDecoder decoder;
+    std::vector<std::byte> stream(bytes);
+    const std::vector<std::byte> frame = frame_bytes(random_frame(1));
+    stream.insert(stream.end(), frame.begin(), frame.end());
+    std::vector<std::uint32_t> damaged;
+    decoder.push(stream, [&](const DecodedFrame& found) { damaged.push_back(found.damaged); });
+    EXPECT_EQ(damaged, std::vector{frames}) << bytes;
+  }
 }
 
-TEST(JumpDetector, FlagsAFlippedHighBitOnceAndAcceptsALastingChange) {
-  JumpDetector detector;
+TEST(BoardDecoder, FlagsAFlippedHighBitOnceAndAcceptsALastingChange) {
+  BoardDecoder decoder;
+  const auto jump = [&](const BoardFrame& frame) {
+    bool jumps = false;
+    decoder.push(frame_bytes(frame), [&](const DecodedFrame& found) { jumps = found.jump; });
+    return jumps;
+  };
   BoardFrame frame;
   frame.samples.fill(3000);
-  EXPECT_FALSE(detector.jump(frame));
+  EXPECT_FALSE(jump(frame));
   BoardFrame flipped = frame;
   flipped.samples[10] ^= 0x400;
-  EXPECT_TRUE(detector.jump(flipped));
-  EXPECT_FALSE(detector.jump(frame));
+  EXPECT_TRUE(jump(flipped));
+  EXPECT_FALSE(jump(frame));
   frame.samples[5] = 2000;
   int flagged = 0;
-  for (int i = 0; i < 10; ++i) flagged += detector.jump(frame) ? 1 : 0;
+  for (int i = 0; i < 10; ++i) flagged += jump(frame) ? 1 : 0;
   EXPECT_EQ(flagged, 3);
 }
 

@@ -101,12 +101,12 @@ TEST(Plate, RefusesNamesItCannotRead) {
       {"ridgesnan", "pitch and height must be positive"},
       {"../plain", "unknown texture \"../plain\""}};
   for (const auto& [bad, why] : cases) {
-    EXPECT_EQ(
-        what_of<std::invalid_argument>([&] { Plate::named(bad); }),
+    EXPECT_REFUSAL(
         "plate \"" + std::string(bad) + "\": " + why +
             "; expected a rig plate such as 3_Bumps, or plain, or ridges|bumps|waves|blobs with a pitch "
             "in mm such as bumps12 or ridges6h1.5, several joined by +, or random and a number, or an STL "
-            "file");
+            "file",
+        Plate::named(bad));
   }
 }
 
@@ -144,8 +144,9 @@ TEST(PlateFile, ARecordingMayNotNameAFileElsewhere) {
   const TemporaryFolder folder;
   write_plate(folder / "my.stl", "6_Bumps");
   const auto refused = [&](const std::string& name, const std::string& in) {
-    EXPECT_EQ(what_of<std::invalid_argument>([&] { plate_in_folder(name, in); }),
-              "plate '" + name + "': expected the name of an STL file beside the recordings, found a path");
+    EXPECT_REFUSAL(
+        "plate '" + name + "': expected the name of an STL file beside the recordings, found a path",
+        plate_in_folder(name, in));
   };
   refused("../" + folder.path() + "/my.stl", folder.path());
   refused(folder / "my.stl", ".");

@@ -63,10 +63,10 @@ TEST(Stl, TextIsRecognisedAsFarAsItIsRead) {
 }
 
 TEST(Stl, NothingIsWrittenThatIsTooLargeToBeRead) {
-  EXPECT_EQ(
-      what_of<std::invalid_argument>([&] { stl_bytes(std::vector<Triangle>(kMaxStlBytes / 50), "title"); }),
+  EXPECT_REFUSAL(
       "stl_bytes: 10737418 triangles make a file of 536870984 bytes, expected at most 536870912; try a "
-      "coarser resolution");
+      "coarser resolution",
+      stl_bytes(std::vector<Triangle>(kMaxStlBytes / 50), "title"));
 }
 
 TEST(Stl, LengthTellsBinaryFromTextWhateverTheFirstWord) {
@@ -75,8 +75,8 @@ TEST(Stl, LengthTellsBinaryFromTextWhateverTheFirstWord) {
   EXPECT_EQ(parse_stl(bytes, "plate.stl"), two_triangles());
   bytes.pop_back();  // now neither: cut off, and no text because of its zero bytes
   expect_refused(bytes, "announces 2 triangles, expected 184 bytes, found 183");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { stl_bytes({}, "solid"); }),
-            "stl_bytes: the title begins with \"solid\", which marks a text file");
+  EXPECT_REFUSAL("stl_bytes: the title begins with \"solid\", which marks a text file",
+                 stl_bytes({}, "solid"));
 }
 
 TEST(Stl, DamagedBinaryNamesTheTriangleOrTheLength) {

@@ -79,15 +79,14 @@ TEST(Truth, CoversEveryTaxelsSquareOfAnyArray) {
 
 TEST(Truth, RefusesAnImageOfTheWrongSize) {
   std::vector<float> image(255);
-  EXPECT_EQ(
-      what_of<std::invalid_argument>([&] { truth_image(Plate::named("plain"), 0, 0, ImageGrid{}, image); }),
+  EXPECT_REFUSAL(
       "truth_image: expected a picture of 1x1 pixels or more and room for all, got 16x16 pixels and room for "
-      "255");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] {
-              truth_image(Plate::named("plain"), 0, 0, {0, 0, 1}, {});
-            }),
-            "truth_image: expected a picture of 1x1 pixels or more and room for all, got 0x0 pixels and room "
-            "for 0");
+      "255",
+      truth_image(Plate::named("plain"), 0, 0, ImageGrid{}, image));
+  EXPECT_REFUSAL(
+      "truth_image: expected a picture of 1x1 pixels or more and room for all, got 0x0 pixels and room "
+      "for 0",
+      truth_image(Plate::named("plain"), 0, 0, {0, 0, 1}, {}));
 }
 
 constexpr std::size_t kPixels = 64, kTruths = 200;

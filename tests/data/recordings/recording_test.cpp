@@ -102,8 +102,8 @@ TEST(Recording, RefusesAnArrayThatIsNone) {
   recording = example();
   recording.array.rows = 65;
   recording.signals.resize(recording.frames() * 17 * 4);
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { write_recording(folder.file("a"), recording); }),
-            "write_recording: signals has 476 values, expected 1820 for 7 frames");
+  EXPECT_REFUSAL("write_recording: signals has 476 values, expected 1820 for 7 frames",
+                 write_recording(folder.file("a"), recording));
   constexpr std::pair<const char*, const char*> kArrays[] = {
       {"4x4", "metadata \"array\": not valid JSON at byte 2"},
       {"4", "metadata \"array\": expected an object {...}, found 4"},
@@ -141,8 +141,7 @@ TEST(Recording, WritesNoneThatBreaksARule) {
   for (const auto& [damage, refusal] : cases) {
     Recording recording = example();
     damage(recording);
-    EXPECT_EQ(what_of<std::invalid_argument>([&] { write_recording(folder.file("a"), recording); }),
-              std::string("write_recording: ") + refusal);
+    EXPECT_REFUSAL(std::string("write_recording: ") + refusal, write_recording(folder.file("a"), recording));
   }
   EXPECT_EQ(folder.entries(), 0u);
 }

@@ -164,8 +164,8 @@ TEST(Alignment, AFlatPassAmongOthersIsLeftAlone) {
 TEST(Alignment, AnotherArrayIsRefused) {
   std::vector<Pass> passes = simulated_passes("6_Bumps");
   passes[1].recording.array.pitch_mm = 2;
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { align(passes); }),
-            "align_passes: expected recordings of the rig's 4x4 taxels at 3 mm, got 4x4 taxels at 2 mm");
+  EXPECT_REFUSAL("align_passes: expected recordings of the rig's 4x4 taxels at 3 mm, got 4x4 taxels at 2 mm",
+                 align(passes));
 }
 
 }  // namespace supertac::alignment_test

@@ -3,10 +3,48 @@
 #include <omp.h>
 
 #include "data/windows/split.h"
-#include "tests/data/scores/surface_windows.h"
+#include "io/numbers/random.h"
+#include "tests/data/test_recordings.h"
 #include "tests/support/test.h"
 
 namespace supertac::baselines_test {
+
+// Passes over 12 mm bumps in which each taxel, scaled, shows base + per_height times the height (0 to 1)
+// under its row, and noise of that deviation.
+WindowSet surface_windows(double base, double per_height, double noise = 0, int passes = 1) {
+  WindowSet set(wide_settings());
+  const Plate plate = Plate::named("bumps12");
+  for (int pass = 1; pass <= passes; ++pass) {
+    Recording recording = make_recording({.plate = "bumps12", .pass = pass, .frames = 900, .start_y_mm = 40});
+    const RandomStream random(static_cast<std::uint64_t>(pass), 0);
+    for (std::size_t i = 0; i < recording.signals.size(); ++i) {
+      const double y = recording.position_mm[2 * (i / rig::kTaxels) + 1];
+      const double row_mm = -4.5 + 3 * static_cast<double>(i % rig::kTaxels / 4);
+      const double height = plate.height(18, y + row_mm) / plate.max_height();
+      recording.signals[i] =
+          static_cast<float>(3 - 2 * (base + per_height * height + noise * random.normal(i)));
+    }
+    set.add(recording);
+  }
+  return set;
+}
+
+std::vector<std::uint32_t> all_of(const WindowSet& set) {
+  std::vector<std::uint32_t> all(set.size());
+  std::iota(all.begin(), all.end(), 0U);
+  return all;
+}
+
+double mean_error(const WindowSet& set, const std::vector<std::uint32_t>& indices, const Baseline& baseline) {
+  std::vector<float> out(256), truth(256);
+  double sum = 0;
+  for (const std::uint32_t i : indices) {
+    baseline.predict(set.window(i), out);
+    set.truth(i, truth);
+    for (std::size_t p = 0; p < 256; ++p) sum += (out[p] - truth[p]) * (out[p] - truth[p]);
+  }
+  return sum / 256 / static_cast<double>(indices.size());
+}
 
 std::vector<float> upsampled(const std::vector<float>& frame, int size = 16) {
   std::vector<float> out(static_cast<std::size_t>(size * size));
@@ -64,20 +102,16 @@ TEST(Bicubic, TakesArraysOfAnyShape) {
 
 TEST(Bicubic, RefusesOtherSizes) {
   std::vector<float> out(256);
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Bicubic(4, 4, 0); }),
-            "bicubic: rows, columns and scale must be at least 1, got 4, 4 and 0");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Bicubic(0, 4, 2); }),
-            "bicubic: rows, columns and scale must be at least 1, got 0, 4 and 2");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Bicubic(4, 4, 4)(std::vector<float>(15), out); }),
-            "baseline: a frame expects 16 values, got 15");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Bicubic(4, 4, 2)(std::vector<float>(16), out); }),
-            "baseline: the image expects 64 values, got 256");
+  EXPECT_REFUSAL("bicubic: rows, columns and scale must be at least 1, got 4, 4 and 0", Bicubic(4, 4, 0));
+  EXPECT_REFUSAL("bicubic: rows, columns and scale must be at least 1, got 0, 4 and 2", Bicubic(0, 4, 2));
+  EXPECT_REFUSAL("baseline: a frame expects 16 values, got 15",
+                 Bicubic(4, 4, 4)(std::vector<float>(15), out));
+  EXPECT_REFUSAL("baseline: the image expects 64 values, got 256",
+                 Bicubic(4, 4, 2)(std::vector<float>(16), out));
 }
 
-WindowSet make_baseline_set() { return surface_windows(0.2, 0.5); }
-
 TEST(Baselines, UndoTheScaleOfTheSignal) {
-  const WindowSet set = make_baseline_set();
+  const WindowSet set = surface_windows(0.2, 0.5);
   const UpsampledFrame bicubic(set, all_of(set));
   // The least-squares line is shrunk below 1 / .5 because bicubic misses part of the shape.
   EXPECT_GT(bicubic.slope(), 1.2);
@@ -88,7 +122,7 @@ TEST(Baselines, UndoTheScaleOfTheSignal) {
 }
 
 TEST(Baselines, AreOrderedOnASignalThatShowsTheSurface) {
-  const WindowSet set = make_baseline_set();
+  const WindowSet set = surface_windows(0.2, 0.5);
   const auto baselines = fit_baselines(set, all_of(set));
   std::vector<std::string> names;
   for (const auto& baseline : baselines) names.push_back(baseline->name());
@@ -98,7 +132,7 @@ TEST(Baselines, AreOrderedOnASignalThatShowsTheSurface) {
 }
 
 TEST(Baselines, MeanImageIsTheMeanTruthWhateverItSees) {
-  const WindowSet set = make_baseline_set();
+  const WindowSet set = surface_windows(0.2, 0.5);
   const std::vector<std::uint32_t> train{3, 400};
   const MeanImage mean(set, train);
   std::vector<float> out(256), a(256), b(256);
@@ -109,7 +143,7 @@ TEST(Baselines, MeanImageIsTheMeanTruthWhateverItSees) {
 }
 
 TEST(Baselines, AllButRidgeSeeTheLastFrameOnly) {
-  const WindowSet set = make_baseline_set();
+  const WindowSet set = surface_windows(0.2, 0.5);
   const auto baselines = fit_baselines(set, all_of(set));
   const std::vector<float> window = set.window(200);
   std::vector<float> out(256), again(256);
@@ -133,23 +167,20 @@ TEST(Baselines, ASignalThatNeverChangesGivesTheMean) {
 }
 
 TEST(Baselines, NeedWindowsToFitTo) {
-  const WindowSet set = make_baseline_set();
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { fit_baselines(set, {}); }),
-            "baseline: there is no example to fit to");
+  const WindowSet set = surface_windows(0.2, 0.5);
+  EXPECT_REFUSAL("baseline: there is no example to fit to", fit_baselines(set, {}));
   const auto baselines = fit_baselines(set, all_of(set));
   std::vector<float> out(256), small(64);
   for (const auto& baseline : baselines) {
     const bool ridge = baseline->name() == "ridge";
-    EXPECT_EQ(what_of<std::invalid_argument>([&] { baseline->predict(std::vector<float>(15), out); }),
-              ridge ? "ridge: expects a window [16][16] and 256 pixels, got 15 and 256 values"
-                    : "baseline: an input is [T][16], got 15 values");
-    EXPECT_EQ(what_of<std::invalid_argument>([&] { baseline->predict(set.window(0), small); }),
-              ridge ? "ridge: expects a window [16][16] and 256 pixels, got 256 and 64 values"
-                    : "baseline: the image expects 256 values, got 64");
+    EXPECT_REFUSAL(ridge ? "ridge: expects a window [16][16] and 256 pixels, got 15 and 256 values"
+                         : "baseline: an input is [T][16], got 15 values",
+                   baseline->predict(std::vector<float>(15), out));
+    EXPECT_REFUSAL(ridge ? "ridge: expects a window [16][16] and 256 pixels, got 256 and 64 values"
+                         : "baseline: the image expects 256 values, got 64",
+                   baseline->predict(set.window(0), small));
   }
 }
-
-constexpr int kSteps = 16;
 
 WindowSet make_ridge_set(double noise, int passes = 5) { return surface_windows(0.3, 0.4, noise, passes); }
 
@@ -184,7 +215,7 @@ TEST(Ridge, IsLinearInTheWindow) {
   const auto train = all_of(set);
   const Ridge ridge(set, train);
   EXPECT_DOUBLE_EQ(ridge.penalty(), 1e-5) << "nothing to guard against without noise";
-  std::vector<float> a(256), b(256), middle(256), window(kSteps * rig::kTaxels);
+  std::vector<float> a(256), b(256), middle(256), window(16 * rig::kTaxels);
   ridge.predict(set.window(10), a);
   ridge.predict(set.window(500), b);
   for (std::size_t i = 0; i < window.size(); ++i) window[i] = (set.window(10)[i] + set.window(500)[i]) / 2;
@@ -205,7 +236,7 @@ TEST(Ridge, OnePassIsEnoughAndADeadArrayGivesTheMean) {
   EXPECT_LT(mean_error(one, {5, 300}, Ridge(one, all_of(one))), 0.02);
   Recording rest = make_recording({.frames = 300, .start_y_mm = 50});
   std::fill(rest.signals.begin(), rest.signals.end(), 3.0F);
-  WindowSet set(wide_settings(kSteps));
+  WindowSet set(wide_settings(16));
   set.add(rest);
   const auto train = all_of(set);
   const MeanImage mean(set, train);
@@ -247,8 +278,7 @@ TEST(Ridge, DoesNotDependOnTheNumberOfThreads) {
 }
 
 TEST(Ridge, RefusesNoWindows) {
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Ridge(make_ridge_set(0.01, 1), {}); }),
-            "ridge: there is no window to fit to");
+  EXPECT_REFUSAL("ridge: there is no window to fit to", Ridge(make_ridge_set(0.01, 1), {}));
 }
 
 }  // namespace supertac::baselines_test

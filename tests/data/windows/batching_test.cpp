@@ -47,10 +47,8 @@ TEST(EpochOrder, Mixes) {
 }
 
 TEST(EpochOrder, RefusesNothing) {
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { EpochOrder(0, 1, 1); }),
-            "epoch order: count must be 1 to 2^32, got 0");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { EpochOrder(5, 1, 1)[5]; }),
-            "epoch order: index 5 is not below 5");
+  EXPECT_REFUSAL("epoch order: count must be 1 to 2^32, got 0", EpochOrder(0, 1, 1));
+  EXPECT_REFUSAL("epoch order: index 5 is not below 5", EpochOrder(5, 1, 1)[5]);
 }
 
 std::vector<std::uint32_t> hundred() {
@@ -100,16 +98,14 @@ TEST(Batching, FewerWindowsThanABatchMakeOneBatch) {
 }
 
 TEST(Batching, RefusesWhatIsNotThere) {
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Batching({}, 16, 3); }),
-            "batching: there is no window to train on");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { Batching(hundred(), 0, 3); }),
-            "batching: the batch size must be at least 1, got 0");
+  EXPECT_REFUSAL("batching: there is no window to train on", Batching({}, 16, 3));
+  EXPECT_REFUSAL("batching: the batch size must be at least 1, got 0", Batching(hundred(), 0, 3));
   const Batching batching(hundred(), 16, 3);
   std::vector<std::uint32_t> batch(16), small(15);
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { batching.batch(0, 6, batch); }),
-            "batching: expected a batch below 6 and room for 16 windows, got batch 6 and room for 16");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { batching.batch(0, 0, small); }),
-            "batching: expected a batch below 6 and room for 16 windows, got batch 0 and room for 15");
+  EXPECT_REFUSAL("batching: expected a batch below 6 and room for 16 windows, got batch 6 and room for 16",
+                 batching.batch(0, 6, batch));
+  EXPECT_REFUSAL("batching: expected a batch below 6 and room for 16 windows, got batch 0 and room for 15",
+                 batching.batch(0, 0, small));
 }
 
 }  // namespace supertac::batching_test

@@ -211,12 +211,10 @@ TEST(LiveWindow, RefusesSettingsOutOfRangeAndAWrongRoom) {
       {{.filter_s = -1}, "filter_s must not be negative, got -1.000000"},
       {{.filter_s = std::nan("")}, "filter_s must not be negative, got nan"}};
   for (const auto& [settings, refusal] : cases)
-    EXPECT_EQ(what_of<std::invalid_argument>([&] { LiveWindow{settings}; }),
-              std::string("live window: ") + refusal);
+    EXPECT_REFUSAL(std::string("live window: ") + refusal, LiveWindow{settings});
   LiveWindow live(live_settings(300));
   Window small(10);
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { (void)live.window(small); }),
-            "live window: needs room for 256 values, got 10");
+  EXPECT_REFUSAL("live window: needs room for 256 values, got 10", live.window(small));
 }
 
 }  // namespace supertac::live_window_test

@@ -94,9 +94,9 @@ TEST(NormaliseWindow, RefusesWhatIsNoWindow) {
   for (const auto& [values, taxels] :
        {std::pair(7, 2), {7, 0}, {0, 2}, {65'536, 1}}) {  // counts would not fit
     std::vector<float> x(static_cast<std::size_t>(values));
-    EXPECT_EQ(what_of<std::invalid_argument>([&] { normalise_window(x, static_cast<std::size_t>(taxels)); }),
-              "normalise_window: a window is [T][" + std::to_string(taxels) + "], T up to 65535, got " +
-                  std::to_string(values) + " values");
+    EXPECT_REFUSAL("normalise_window: a window is [T][" + std::to_string(taxels) + "], T up to 65535, got " +
+                       std::to_string(values) + " values",
+                   normalise_window(x, static_cast<std::size_t>(taxels)));
   }
 }
 
@@ -216,8 +216,8 @@ TEST(Augment, RefusesNegativeMagnitudes) {
   EXPECT_EQ(message({.dropped = 17}), "augmentation: dropped must be 0 to 16 taxels, got 17");
   EXPECT_EQ(message({.dropped = -1}), "augmentation: dropped must be 0 to 16 taxels, got -1");
   std::vector<float> window(17);
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { augment({.gain = 1}, 1, 1, window); }),
-            "augment: a window of 4x4 taxels at 3 mm is [T][16], got 17 values");
+  EXPECT_REFUSAL("augment: a window of 4x4 taxels at 3 mm is [T][16], got 17 values",
+                 augment({.gain = 1}, 1, 1, window));
   EXPECT_NO_THROW(check(AugmentSettings{}));
 }
 
@@ -242,11 +242,10 @@ TEST(Augment, AnyArray) {
   EXPECT_NEAR(static_cast<double>(dropped), 50, 20);
   EXPECT_GT(levels.size(), 1800U);  // of 2250, some of which are clipped or dropped
   std::vector<float> window(array.signals());
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { augment({.dropped = 16}, 1, 1, window, array); }),
-            "augmentation: dropped must be 0 to 15 taxels, got 16");
-  EXPECT_EQ(
-      what_of<std::invalid_argument>([&] { augment({.gain = 1}, 1, 1, std::span(window).first(44), array); }),
-      "augment: a window of 3x5 taxels at 3 mm with 3 channels is [T][45], got 44 values");
+  EXPECT_REFUSAL("augmentation: dropped must be 0 to 15 taxels, got 16",
+                 augment({.dropped = 16}, 1, 1, window, array));
+  EXPECT_REFUSAL("augment: a window of 3x5 taxels at 3 mm with 3 channels is [T][45], got 44 values",
+                 augment({.gain = 1}, 1, 1, std::span(window).first(44), array));
 }
 
 }  // namespace supertac::transforms_test

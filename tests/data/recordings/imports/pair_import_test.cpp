@@ -1,4 +1,4 @@
-#include "data/recordings/imports/table_import.h"
+#include "data/recordings/imports/imports.h"
 #include "data/windows/split.h"
 #include "io/files/file.h"
 #include "tests/support/test.h"

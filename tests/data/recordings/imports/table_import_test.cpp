@@ -1,4 +1,4 @@
-#include "data/recordings/imports/table_import.h"
+#include "data/recordings/imports/imports.h"
 
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
@@ -216,7 +216,7 @@ TEST_F(TableImport, ImpossibleValuesAreNamed) {
         {"time=0,x=1,y=2,time=3", "names time twice"},
         {"x=0", "names only one of x and y; a position has both"},
         {"z=0", "found 'z=0', expected time=COLUMN[:s|ms|us|ns], x=COLUMN, y=COLUMN, values=FIRST-LAST"}})
-    EXPECT_EQ(what_of<std::invalid_argument>([&] { column_map(map); }), why);
+    EXPECT_REFUSAL(why, column_map(map));
 }
 
 TEST_F(TableImport, NumpyArraysAndWhatTheyMayNotBe) {

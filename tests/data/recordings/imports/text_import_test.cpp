@@ -1,4 +1,4 @@
-#include "data/recordings/imports/text_import.h"
+#include "data/recordings/imports/imports.h"
 
 #include "io/files/file.h"
 #include "io/numbers/random.h"
