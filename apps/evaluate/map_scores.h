@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "apps/evaluate/scoring.h"
-#include "data/map/elements.h"
-#include "data/map/map_file.h"
+#include "data/map/named_map.h"
 #include "data/scores/metrics.h"
 
 namespace supertac {

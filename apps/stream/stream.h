@@ -22,8 +22,7 @@
 #include "apps/stream/raw_array.h"
 #include "apps/stream/views/line_output.h"
 #include "apps/stream/views/web_view.h"
-#include "data/map/elements.h"
-#include "data/map/map_file.h"
+#include "data/map/named_map.h"
 
 namespace supertac {
 

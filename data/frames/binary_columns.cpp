@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "data/frames/binary_decoder.h"
-#include "data/frames/probe.h"
 #include "io/numbers/median.h"
 
 namespace supertac {

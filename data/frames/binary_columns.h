@@ -5,15 +5,14 @@
 #include <array>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "data/sensors/sensor.h"
+#include "data/frames/probe.h"
 
 namespace supertac {
-
-struct Heard;
 
 using Bytes = std::span<const unsigned char>;
 inline constexpr double kNever = std::numeric_limits<double>::infinity();  ///< bits of what is not so
@@ -111,5 +110,25 @@ class BinaryColumns {
   std::vector<Values> values_;
   std::vector<std::vector<FieldFound>> fields_;
 };
+
+/// One way to read binary frames, and how few bits describe the bytes when they are read so.
+struct BinaryReading {
+  FrameFormat format;
+  std::size_t values = 0, period = 0;  ///< numbers, and bytes, of a frame
+  double bits = 0, sent = 0;           ///< of the description, and of all bytes as they came
+  bool unit_assumed = false;           ///< of the clock; a file says nothing of the time it took
+  bool unknown = false;                ///< some bytes are no value and have no meaning that is known
+  bool mixed = false;                  ///< its fields have two byte orders
+  bool sign_unsure = false;            ///< signed, though what is below 0 is the same number each time
+  std::string text() const;
+};
+/// Of numbers of two bytes a higher one changes, and no lower one has its highest bit.
+bool holds_seven_bits(const BinaryReading& reading, std::span<const Heard> heard);
+/// The best reading of the bytes, where it leads the second by 8 bits (256 to 1), and no reading takes a part
+/// of its frames for whole ones; else empty, and `says` names both. `values`: how many a frame has, where
+/// that is known.
+std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
+                                                std::optional<std::size_t> values,
+                                                std::vector<std::string>& says);
 
 }  // namespace supertac

@@ -7,7 +7,6 @@
 
 #include "data/frames/binary_columns.h"
 #include "data/frames/binary_decoder.h"
-#include "data/frames/probe.h"
 #include "io/numbers/median.h"
 #include "io/numbers/text.h"
 

@@ -8,7 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "data/frames/binary_columns.h"
 #include "data/frames/sensor_decoder.h"
+#include "data/frames/text_grammar.h"
 #include "data/sensors/layout.h"
 #include "data/sensors/rest_tracker.h"
 #include "io/numbers/median.h"
@@ -16,6 +18,36 @@
 
 namespace supertac {
 namespace {
+
+// The frames that were heard, [signal][frame]: as Sensor::arrange() without rest and gain; without those in
+// which a signal is no number.
+struct HeardFrames {
+  std::vector<std::vector<float>> signals;
+  std::size_t count = 0, steps = 0;
+  double seconds = 0, frame_bytes = 0;  // of the steps in which time went on; of all whole frames
+};
+
+HeardFrames frames_of(const Sensor& sensor, std::span<const Heard> heard) {
+  Sensor bare = sensor;
+  bare.rest.clear(), bare.gain.clear();
+  const auto decoder = make_decoder(sensor);
+  HeardFrames frames;
+  frames.signals.resize(sensor.array.signals());
+  std::vector<float> signals(sensor.array.signals());
+  double before = 0;
+  for (const Heard& chunk : heard)
+    decoder->push(std::as_bytes(std::span(chunk.bytes)), [&](const DecodedFrame& frame) {
+      bare.arrange(frame.values, signals);
+      if (!std::ranges::all_of(signals, [](float v) { return std::isfinite(v); })) return;
+      const double time = frame.time_s.value_or(chunk.time_s);
+      if (frames.count++ > 0 && time >= before) ++frames.steps, frames.seconds += time - before;
+      before = time;
+      for (std::size_t s = 0; s < signals.size(); ++s) frames.signals[s].push_back(signals[s]);
+    });
+  const auto counted = decoder->counters();
+  frames.frame_bytes = static_cast<double>(counted.bytes - counted.discarded_bytes);
+  return frames;
+}
 
 // Polarity, range, noise and what never moves; into the draft where they are known.
 // What was known of a sensor stays where nothing says more than that.
@@ -150,28 +182,6 @@ FoundLayout layout_of(const HeardFrames& frames) {
 }
 
 }  // namespace
-
-HeardFrames frames_of(const Sensor& sensor, std::span<const Heard> heard) {
-  Sensor bare = sensor;
-  bare.rest.clear(), bare.gain.clear();
-  const auto decoder = make_decoder(sensor);
-  HeardFrames frames;
-  frames.signals.resize(sensor.array.signals());
-  std::vector<float> signals(sensor.array.signals());
-  double before = 0;
-  for (const Heard& chunk : heard)
-    decoder->push(std::as_bytes(std::span(chunk.bytes)), [&](const DecodedFrame& frame) {
-      bare.arrange(frame.values, signals);
-      if (!std::ranges::all_of(signals, [](float v) { return std::isfinite(v); })) return;
-      const double time = frame.time_s.value_or(chunk.time_s);
-      if (frames.count++ > 0 && time >= before) ++frames.steps, frames.seconds += time - before;
-      before = time;
-      for (std::size_t s = 0; s < signals.size(); ++s) frames.signals[s].push_back(signals[s]);
-    });
-  const auto counted = decoder->counters();
-  frames.frame_bytes = static_cast<double>(counted.bytes - counted.discarded_bytes);
-  return frames;
-}
 
 ProbeReport probe(std::span<const Heard> heard, const std::string& port, const std::optional<Sensor>& known) {
   ProbeReport report;

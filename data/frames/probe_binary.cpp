@@ -7,7 +7,6 @@
 
 #include "data/frames/binary_columns.h"
 #include "data/frames/binary_decoder.h"
-#include "data/frames/probe.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
@@ -288,24 +287,10 @@ class Search {
   std::map<std::tuple<std::size_t, std::size_t, std::size_t, bool, std::size_t>, BinaryReading> best_;
 };
 
-}  // namespace
-
-std::string BinaryReading::text() const {
-  const FrameFormat& f = format;
-  std::string text = f.header.empty() ? "no header" : "header " + hex_of_bytes(f.header);
-  for (const FrameField& field : f.fields) {
-    if (field.is == FrameField::Is::counter) text += ", a counter " + field.type;
-    if (field.is == FrameField::Is::skip)
-      text += ", " + std::to_string(field.count) + " bytes that are no value";
-  }
-  if (f.time) text += ", a clock " + f.time->type + " in " + supertac::format(f.time->unit_s) + " s";
-  text += ", " + std::to_string(values) + " values " + f.type;
-  if (f.type.back() != '8') text += f.big_endian ? " big-endian" : " little-endian";
-  if (f.checksum != "none") text += ", checksum " + f.checksum;
-  if (!f.trailer.empty()) text += ", trailer " + hex_of_bytes(f.trailer);
-  return text + " (explains " + supertac::format(100 * (1 - bits / sent), 0) + " % of the bytes)";
-}
-
+// Readings of the bytes, the best first, no two of which give the same numbers. Header (0 to 4 bytes),
+// clock, counter, type, byte order, count, checksum and what it covers, and trailer are found at once, by
+// the length of the bytes' description (binary_columns.h).
+std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::optional<std::size_t> values);
 std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::optional<std::size_t> values) {
   std::string all;
   for (const Heard& chunk : heard) all += chunk.bytes;
@@ -323,6 +308,24 @@ std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::op
   for (BinaryReading& r : found) r.sent = 8.0 * static_cast<double>(bytes.size());
   std::ranges::sort(found, {}, &BinaryReading::bits);
   return found;
+}
+
+}  // namespace
+
+std::string BinaryReading::text() const {
+  const FrameFormat& f = format;
+  std::string text = f.header.empty() ? "no header" : "header " + hex_of_bytes(f.header);
+  for (const FrameField& field : f.fields) {
+    if (field.is == FrameField::Is::counter) text += ", a counter " + field.type;
+    if (field.is == FrameField::Is::skip)
+      text += ", " + std::to_string(field.count) + " bytes that are no value";
+  }
+  if (f.time) text += ", a clock " + f.time->type + " in " + supertac::format(f.time->unit_s) + " s";
+  text += ", " + std::to_string(values) + " values " + f.type;
+  if (f.type.back() != '8') text += f.big_endian ? " big-endian" : " little-endian";
+  if (f.checksum != "none") text += ", checksum " + f.checksum;
+  if (!f.trailer.empty()) text += ", trailer " + hex_of_bytes(f.trailer);
+  return text + " (explains " + supertac::format(100 * (1 - bits / sent), 0) + " % of the bytes)";
 }
 
 std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,

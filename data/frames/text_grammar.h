@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -109,5 +110,24 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& lines);
 /// checksum is the sum or xor of the numbers before it; a constant at an edge is no taxel when the rest makes
 /// a better array; the others are signals. A doubt is added to `grammar`.
 std::vector<SlotRole> roles_of(TextGrammar& grammar, double seconds);
+
+/// The unit (s) of a column of stamps, from how far it went in `seconds`: 1, 1e-3 or 1e-6; empty when it is
+/// no clock. For bytes that came at once, as from a file: milliseconds where all are whole, else seconds.
+std::optional<double> unit_of_clock(std::span<const double> stamps, double seconds);
+
+/// A format that may be it, and the array that its frames are.
+struct FoundFormat {
+  FrameFormat format;
+  TaxelArray array;
+  std::string remark;          ///< for people
+  std::vector<int> dead = {};  ///< values that say "nan", "-" or nothing only
+};
+/// Columns of numbers or objects of JSON in `bytes`, which were heard for `seconds`; empty, and `says` why,
+/// where they are neither.
+std::optional<FoundFormat> find_text_format(const std::string& bytes, double seconds,
+                                            std::vector<std::string>& says);
+/// Of so many values the most nearly square array, or the one that nested lists of JSON show (`nested`: the
+/// length of each, from outside), with three channels where they are threes; empty when no array has so many.
+std::optional<TaxelArray> assumed_array(std::size_t values, std::span<const std::size_t> nested = {});
 
 }  // namespace supertac

@@ -1,4 +1,4 @@
-#include "data/map/elements.h"
+#include "data/map/named_map.h"
 
 #include <algorithm>
 #include <cmath>

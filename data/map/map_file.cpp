@@ -1,10 +1,9 @@
-#include "data/map/map_file.h"
+#include "data/map/named_map.h"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "data/map/elements.h"
 #include "data/plates/stl.h"
 #include "io/files/safetensors.h"
 #include "io/images/images.h"

@@ -113,7 +113,8 @@ int take_count(std::map<std::string, std::string>& metadata, const std::string& 
   return static_cast<int>(*value);
 }
 
-void check_shape(const SafetensorsFile& file, const std::string& name, std::vector<std::uint64_t> expected) {
+void check_shape(const SafetensorsFile& file, const std::string& name,
+                 const std::vector<std::uint64_t>& expected) {
   const auto& shape = file.tensors().at(name).shape;
   if (shape == expected) return;
   throw FileError(file.path(), "tensor " + in_quotes(name) + " has shape " + shape_text(shape) +
@@ -158,7 +159,8 @@ Recording recording_of(const SafetensorsFile& file) {
   recording.speed_mm_s = *speed_value;
 
   recording.array = array_of(file);
-  recording.signal_scale = signal_scale_of(file);
+  if (file.metadata().contains("signals"))
+    recording.signal_scale = scale_of({file.metadata(), path, "signals"});
   if (recording.metadata.contains("body")) recording.body = body_of({file.metadata(), path, "body"});
   recording.metadata.erase("body");
   recording.metadata.erase("array"), recording.metadata.erase("signals");
@@ -176,14 +178,14 @@ Recording recording_of(const SafetensorsFile& file) {
   const std::uint64_t n = recording.frames();
   check_shape(file, "time_s", {n});
   check_shape(file, signals_tensor(file), {n, recording.array.signals()});
-  if (file.tensors().contains("position_mm")) {
-    recording.position_mm = file.f32("position_mm");
-    check_shape(file, "position_mm", {n, 2});
-  }
-  if (file.tensors().contains("lift_mm")) {
-    recording.lift_mm = file.f32("lift_mm");
-    check_shape(file, "lift_mm", {n});
-  }
+  const auto take_if_there = [&](const char* name, std::vector<float>& values,
+                                 const std::vector<std::uint64_t>& shape) {
+    if (!file.tensors().contains(name)) return;
+    values = file.f32(name);
+    check_shape(file, name, shape);
+  };
+  take_if_there("position_mm", recording.position_mm, {n, 2});
+  take_if_there("lift_mm", recording.lift_mm, {n});
   if (const auto found = file.tensors().find("truth"); found != file.tensors().end()) {
     const std::vector<std::uint64_t>& shape = found->second.shape;
     const auto side = [&](std::size_t axis) {
@@ -206,16 +208,15 @@ void write_recording(const std::string& path, const Recording& recording) {
                                          "F32",
                                          {n, recording.array.signals()},
                                          std::as_bytes(std::span(recording.signals))}};
-  if (!recording.position_mm.empty()) {
-    tensors.push_back({"position_mm", "F32", {n, 2}, std::as_bytes(std::span(recording.position_mm))});
-  }
-  if (!recording.lift_mm.empty())
-    tensors.push_back({"lift_mm", "F32", {n}, std::as_bytes(std::span(recording.lift_mm))});
-  if (!recording.truth.empty()) {
-    const auto height = static_cast<std::uint64_t>(recording.truth_height);
-    const auto width = static_cast<std::uint64_t>(recording.truth_width);
-    tensors.push_back({"truth", "F32", {n, height, width}, std::as_bytes(std::span(recording.truth))});
-  }
+  const auto add = [&](const char* name, const std::vector<float>& values,
+                       const std::vector<std::uint64_t>& shape) {
+    if (!values.empty()) tensors.push_back({name, "F32", shape, std::as_bytes(std::span(values))});
+  };
+  add("position_mm", recording.position_mm, {n, 2});
+  add("lift_mm", recording.lift_mm, {n});
+  add("truth", recording.truth,
+      {n, static_cast<std::uint64_t>(recording.truth_height),
+       static_cast<std::uint64_t>(recording.truth_width)});
   write_safetensors(path, metadata_of(recording), tensors);
 }
 
@@ -230,11 +231,6 @@ TaxelArray array_of(const SafetensorsFile& file) {
     throw FileError(file.path(), error.what());
   }
   return array;
-}
-
-SignalScale signal_scale_of(const SafetensorsFile& file) {
-  if (!file.metadata().contains("signals")) return {};
-  return scale_of({file.metadata(), file.path(), "signals"});
 }
 
 std::map<std::string, std::string> metadata_of(const TaxelArray& array, const SignalScale& scale) {

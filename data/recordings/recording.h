@@ -70,10 +70,9 @@ void write_recording(const std::string& path, const Recording& recording);
 /// its own have a key of these.
 std::map<std::string, std::string> metadata_of(const Recording& recording);
 
-/// "array" and "signals" of a file's metadata, which recordings and logs of pictures have, and back; a file
-/// without them has the rig's. Throw FileError.
+/// "array" of a file's metadata, the rig's where it has none (throws FileError); and "array" and "signals",
+/// which recordings and logs of pictures have.
 TaxelArray array_of(const SafetensorsFile& file);
-SignalScale signal_scale_of(const SafetensorsFile& file);
 std::map<std::string, std::string> metadata_of(const TaxelArray& array, const SignalScale& scale);
 
 /// The tensor that holds the signals of a recording or a log of pictures: "volts" where they are volts,

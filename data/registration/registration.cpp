@@ -49,6 +49,16 @@ double least_pitch(const std::vector<double>& crests, double most) {
   return most;
 }
 
+// Where, from the centre along y, a row of taxels (0 trailing) feels an element best. The rig's rows do so
+// nearer together than they lie, for its pad is round; those of another sensor, of the same array too, where
+// they are.
+double row_contact_mm(const Recording& recording, std::size_t row) {
+  constexpr double kRigMm[] = {-3.5, -1.3, 1.3, 3.5};  // medians over the rig's 96 passes
+  const TaxelArray& array = recording.array;
+  const bool of_the_rig = array == TaxelArray{} && recording.signal_scale == SignalScale{};
+  return of_the_rig ? kRigMm[row] : array.y_mm(static_cast<int>(row) * array.columns);
+}
+
 class Fit {
  public:
   Fit(const Recording& recording, const Plate& plate)
@@ -294,13 +304,6 @@ void fill_loss(const Registration& registration, Recording& recording) {
 }
 
 }  // namespace
-
-double row_contact_mm(const Recording& recording, std::size_t row) {
-  constexpr double kRigMm[] = {-3.5, -1.3, 1.3, 3.5};  // medians over the rig's 96 passes
-  const TaxelArray& array = recording.array;
-  const bool of_the_rig = array == TaxelArray{} && recording.signal_scale == SignalScale{};
-  return of_the_rig ? kRigMm[row] : array.y_mm(static_cast<int>(row) * array.columns);
-}
 
 void judge(Registration& r, const Recording& recording, const Plate& plate) {
   r.reason = why_unreliable(r);

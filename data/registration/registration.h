@@ -35,11 +35,6 @@ struct Registration {
   double y_mm(double t) const { return start_mm + rate * (t + (t >= lost_at_s ? lost_s : 0)); }
 };
 
-/// Where, from the centre along y, a row of taxels (0 trailing) feels an element best. The rig's rows do so
-/// nearer together than they lie, for its pad is round; those of another sensor, of the same array too, where
-/// they are.
-double row_contact_mm(const Recording& recording, std::size_t row);
-
 /// Fits start and rate of a pass to its plate. Each element of the texture that passes a taxel row makes a
 /// contact (find_contacts); the fit is the line that puts the contacts of all rows onto the plate's elements:
 ///   y(time of contact) + row offset = crest of the element.

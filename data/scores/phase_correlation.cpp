@@ -1,14 +1,14 @@
-#include "data/scores/phase_correlation.h"
+// By how much two images are displaced against each other.
 
 #include <kissfft/kiss_fft.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <new>
 #include <stdexcept>
 #include <string>
 
+#include "data/scores/metrics.h"
 #include "io/numbers/same_bits.h"
 
 namespace supertac {
@@ -31,8 +31,6 @@ double parabola_top(double before, double top, double after) {
 }
 
 }  // namespace
-
-void PhaseCorrelator::Free::operator()(void* plan) const { std::free(plan); }
 
 PhaseCorrelator::Plans::Plans(int height, int width, bool inverse) {
   if (height < 4 || width < 4)

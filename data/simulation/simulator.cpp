@@ -266,24 +266,13 @@ double rocking(const RandomStream& random, double y_mm) {
 }
 
 // A finger that is dragged over a plate does not keep its angles, and a printer's path is not level.
-class Wander {
- public:
-  Wander(double strength, std::uint64_t seed, std::uint64_t stream)
-      : strength_(strength),
-        across_(seed, stream_named("wander") + stream),
-        along_(seed, stream_named("wander") + stream + 1),
-        height_(seed, stream_named("wander") + stream + 2) {}
-  void apply(FingerPose& pose) const {
-    if (strength_ <= 0) return;
-    pose.slope_x += strength_ * rocking(across_, pose.y_mm);
-    pose.slope_y += strength_ * rocking(along_, pose.y_mm);
-    pose.z_mm += 4 * strength_ * rocking(height_, pose.y_mm);
-  }
-
- private:
-  double strength_;
-  RandomStream across_, along_, height_;
-};
+void wander(double strength, std::uint64_t seed, std::uint64_t stream, FingerPose& pose) {
+  if (strength <= 0) return;
+  const auto rocks = [&](std::uint64_t which) {
+    return strength * rocking({seed, stream_named("wander") + stream + which}, pose.y_mm);
+  };
+  pose.slope_x += rocks(0), pose.slope_y += rocks(1), pose.z_mm += 4 * rocks(2);
+}
 
 void check(const PassSettings& pass, const SimulatorSettings& settings) {
   const auto positive = [](double v) { return std::isfinite(v) && v > 0; };
@@ -347,7 +336,6 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
   // Timing faults have a stream of their own for each pass, so that a loss in one pass does not move
   // another's.
   const RandomStream timing(seed, stream_named("time") + finger.noise_stream());
-  const Wander wander(settings.wander, seed, finger.noise_stream());
   MovingAverage filter(static_cast<int>(std::lround(settings.filter_s * settings.rate_hz)));
 
   BodyResponse response(settings.body, settings.array);
@@ -358,7 +346,7 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
     const double taken = stamp + settings.jitter_s * timing.normal(2 * i);
     FingerPose felt = pose_at(taken, pass);
     felt.z_mm += finger.slide_z_mm();
-    wander.apply(felt);
+    wander(settings.wander, seed, finger.noise_stream(), felt);
     std::vector<double> volts = finger.volts(felt, taken);
     if (settings.with_adc)
       for (double& v : volts) v = rig::volts_of(rig::adc_of(v));

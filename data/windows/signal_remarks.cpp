@@ -14,51 +14,35 @@ constexpr std::size_t kLookedAt = 4000;
 constexpr float kStill = 0.02F;
 constexpr double kAtTheEnd = 0.05;
 
-/// Smallest and largest value of each signal.
-class SwingRanges {
- public:
-  explicit SwingRanges(std::size_t signals) : low_(signals, 1e30F), high_(signals, -1e30F) {}
-  void add(std::span<const float> frame) {
-    for (std::size_t s = 0; s < low_.size(); ++s) {
-      low_[s] = std::min(low_[s], frame[s]), high_[s] = std::max(high_[s], frame[s]);
-      at_the_end_ += frame[s] >= 1 ? 1 : 0, ++count_;
-    }
-  }
-  double share_at_the_end() const { return static_cast<double>(at_the_end_) / static_cast<double>(count_); }
-  /// Those that stand still beside the others; all when none moves.
-  std::vector<std::size_t> still() const {
-    std::vector<float> swings;
-    for (std::size_t s = 0; s < low_.size(); ++s) swings.push_back(high_[s] - low_[s]);
-    std::vector<float> sorted = swings;
-    const float limit = kStill * median(sorted);
-    std::vector<std::size_t> found;
-    for (std::size_t s = 0; s < swings.size(); ++s)
-      if (swings[s] <= limit) found.push_back(s);
-    return found;
-  }
-
- private:
-  std::vector<float> low_, high_;
-  std::size_t at_the_end_ = 0, count_ = 0;
-};
-
 }  // namespace
 
 std::vector<std::string> remarks_on(const WindowSet& windows, std::span<const std::uint32_t> chosen) {
   if (chosen.empty()) return {};
-  SwingRanges swings(windows.array().signals());
-  bool touched = false;
-  for (const std::uint32_t i : evenly_spaced(chosen, kLookedAt)) swings.add(windows.shown_frame(i));
-  for (const std::uint32_t i : chosen) touched = touched || windows.contact(i);
+  const std::size_t signals = windows.array().signals();
+  std::vector<float> low(signals, 1e30F), high(signals, -1e30F), swings(signals);
+  std::size_t at_the_end = 0, count = 0;
+  for (const std::uint32_t i : evenly_spaced(chosen, kLookedAt)) {
+    const std::vector<float> frame = windows.shown_frame(i);
+    for (std::size_t s = 0; s < signals; ++s, ++count) {
+      low[s] = std::min(low[s], frame[s]), high[s] = std::max(high[s], frame[s]);
+      at_the_end += frame[s] >= 1 ? 1 : 0;
+    }
+  }
+  for (std::size_t s = 0; s < signals; ++s) swings[s] = high[s] - low[s];
+  const float limit = kStill * median(std::vector(swings));
+  std::vector<std::size_t> still;  // beside the others; all when none moves
+  for (std::size_t s = 0; s < signals; ++s)
+    if (swings[s] <= limit) still.push_back(s);
+  const bool touched = std::ranges::any_of(chosen, [&](std::uint32_t i) { return windows.contact(i); });
+  const double share_at_the_end = static_cast<double>(at_the_end) / static_cast<double>(count);
   std::vector<std::string> remarks;
-  const std::vector<std::size_t> still = swings.still();
-  if (still.size() == windows.array().signals())
+  if (still.size() == signals)
     remarks.emplace_back(
         "no signal changes: the sensor is dead, or its signals lie outside the model's range");
   else if (!still.empty())
     remarks.push_back("signals " + joined(still, ", ") + " never change: dead taxels, or stuck ones");
-  if (swings.share_at_the_end() >= kAtTheEnd)
-    remarks.push_back(format(100 * swings.share_at_the_end(), 1) +
+  if (share_at_the_end >= kAtTheEnd)
+    remarks.push_back(format(100 * share_at_the_end, 1) +
                       " % of the signals lie at the end of the model's range: saturated, or clipped");
   if (!touched)
     remarks.emplace_back("every truth is 0 everywhere: nothing can be learnt or scored in contact");

@@ -47,28 +47,6 @@ void delay_truth(Track& track, std::size_t frames) {
 constexpr double kClearanceMm = 1.5;
 constexpr std::size_t kFingerNumbers = 3;  // x, y, lift
 
-// Why a frame of a track can end no window: the count it adds to; null when it can.
-class WhyNone {
- public:
-  WhyNone(const Recording& recording, const Track& track, const Plate& plate)
-      : track_(track), measured_(!recording.truth.empty()), clear_mm_(plate.max_height() + kClearanceMm) {
-    reliable_ = value_or(recording.metadata, "registration_reliable") != "no";
-  }
-  std::size_t WindowCounts::*operator()(std::size_t frame) const {
-    if (measured_) return nullptr;
-    if (!reliable_) return &WindowCounts::unreliable;
-    if (!std::isfinite(track_.position_mm[2 * frame]) || !std::isfinite(track_.position_mm[2 * frame + 1]))
-      return &WindowCounts::no_position;
-    const float lift = track_.lift_mm[frame];
-    return lift > kLiftedMm && lift < clear_mm_ ? &WindowCounts::lifting : nullptr;
-  }
-
- private:
-  const Track& track_;
-  bool measured_, reliable_;
-  double clear_mm_;
-};
-
 void check_size(const char* what, std::size_t got, std::size_t expected) {
   if (got != expected)
     throw std::invalid_argument("windows: " + std::string(what) + " needs room for " +
@@ -197,7 +175,18 @@ void WindowSet::add(const Recording& recording, const std::string& folder, const
             .windows = 0,
             .use = use};
   const auto stride = static_cast<std::uint32_t>(use.stride > 0 ? use.stride : settings_.stride);
-  const WhyNone why_none(recording, track, plates_[stored.plate].plate);
+  const bool measured = !recording.truth.empty(),
+             reliable = value_or(recording.metadata, "registration_reliable") != "no";
+  const double clear_mm = plates_[stored.plate].plate.max_height() + kClearanceMm;
+  // Why a frame can end no window: the count it adds to; null when it can.
+  const auto why_none = [&](std::size_t frame) -> std::size_t WindowCounts::* {
+    if (measured) return nullptr;
+    if (!reliable) return &WindowCounts::unreliable;
+    if (!std::isfinite(track.position_mm[2 * frame]) || !std::isfinite(track.position_mm[2 * frame + 1]))
+      return &WindowCounts::no_position;
+    const float lift = track.lift_mm[frame];
+    return lift > kLiftedMm && lift < clear_mm ? &WindowCounts::lifting : nullptr;
+  };
   for (std::size_t first = 0, end = 0; first < track.frames(); first = end) {
     const auto why = why_none(first);
     for (end = first + 1; end < track.frames() && track.run[end] > 1 && why_none(end) == why;) ++end;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <numeric>
 #include <string>
 
 #include "data/recordings/recording.h"
@@ -38,6 +39,13 @@ inline Recording make_recording(const PassPlan& plan) {
     recording.position_mm.push_back(static_cast<float>(plan.start_y_mm + plan.speed_mm_s * t));
   }
   return recording;
+}
+
+/// The numbers of all windows of a set.
+inline std::vector<std::uint32_t> all_of(const WindowSet& set) {
+  std::vector<std::uint32_t> all(set.size());
+  std::iota(all.begin(), all.end(), 0U);
+  return all;
 }
 
 /// Scales so that the voltages above stay apart: x = 1 - (V - 1) / 2, roughly.

@@ -9,6 +9,7 @@
 #include "data/windows/windows.h"
 #include "io/files/file.h"
 #include "models/training/train.h"
+#include "tests/data/test_recordings.h"
 #include "tests/support/test.h"
 
 namespace supertac {
@@ -94,12 +95,6 @@ inline WindowSet small_windows(const SuperTacSettings& model, std::size_t frames
     windows.add(r);
   }
   return windows;
-}
-
-inline std::vector<std::uint32_t> all_of(const WindowSet& windows) {
-  std::vector<std::uint32_t> indices;
-  for (std::uint32_t i = 0; i < windows.size(); ++i) indices.push_back(i);
-  return indices;
 }
 
 /// What a test trains; it may change the recipe before.

@@ -1,7 +1,7 @@
 #include "apps/stream/views/web_view.h"
 
 #include "apps/web/pages.h"
-#include "data/map/elements.h"
+#include "data/map/named_map.h"
 #include "hardware/ports/serial_port.h"
 
 namespace supertac {

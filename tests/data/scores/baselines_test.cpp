@@ -29,12 +29,6 @@ WindowSet surface_windows(double base, double per_height, double noise = 0, int 
   return set;
 }
 
-std::vector<std::uint32_t> all_of(const WindowSet& set) {
-  std::vector<std::uint32_t> all(set.size());
-  std::iota(all.begin(), all.end(), 0U);
-  return all;
-}
-
 double mean_error(const WindowSet& set, const std::vector<std::uint32_t>& indices, const Baseline& baseline) {
   std::vector<float> out(256), truth(256);
   double sum = 0;

@@ -1,6 +1,7 @@
 #include "data/windows/signal_remarks.h"
 
 #include "data/simulation/simulator.h"
+#include "tests/data/test_recordings.h"
 #include "tests/support/test.h"
 
 namespace supertac::signal_remarks_test {
@@ -12,9 +13,7 @@ Remarks remarks_after(const std::string& plate, void (*change)(Recording&)) {
   change(recording);
   WindowSet windows((WindowSettings()));
   windows.add(recording);
-  std::vector<std::uint32_t> all(windows.size());
-  std::iota(all.begin(), all.end(), 0U);
-  return remarks_on(windows, all);
+  return remarks_on(windows, all_of(windows));
 }
 
 void set_taxels(Recording& recording, int taxels, float volts) {

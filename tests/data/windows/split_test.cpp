@@ -185,11 +185,9 @@ TEST(Split, OfSimulatedPassesAFourthOfTheWindowsWithoutContactIsKept) {
   const std::size_t textured = windows.size();
   windows.add(simulate_pass(Plate::named("plain"), {}), ".", kOneOfMany);
   windows.add(simulate_pass(Plate::named("6_Bumps"), {}));
-  std::vector<std::uint32_t> all(windows.size());
-  std::iota(all.begin(), all.end(), 0U);
   std::size_t contact = 0, silent = 0, kept_contact = 0, kept_silent = 0, kept_whole = 0;
   for (std::uint32_t i = 0; i < textured; ++i) ++(windows.contact(i) ? contact : silent);
-  for (const std::uint32_t i : subsample_no_contact(windows, all)) {
+  for (const std::uint32_t i : subsample_no_contact(windows, all_of(windows))) {
     if (i >= textured)
       ++kept_whole;
     else

@@ -1,6 +1,5 @@
-#include "data/map/elements.h"
+#include "data/map/named_map.h"
 
-#include "data/map/map_file.h"
 #include "data/plates/stl.h"
 #include "data/plates/truth.h"
 #include "io/files/safetensors.h"
@@ -8,7 +7,7 @@
 #include "io/numbers/random.h"
 #include "tests/support/test.h"
 
-namespace supertac::elements_test {
+namespace supertac::named_map_test {
 
 constexpr double kCellMm = 0.75;
 
@@ -220,4 +219,4 @@ TEST_F(MapFiles, SaysWhatIsWrong) {
   EXPECT_ERROR(write_maps(path(".png"), {}), std::invalid_argument, "expected at least one, got none");
 }
 
-}  // namespace supertac::elements_test
+}  // namespace supertac::named_map_test
