@@ -11,7 +11,7 @@
 
 #include "apps/stream/pressed_order.h"
 #include "data/clock/frame_clock.h"
-#include "data/map/map_file.h"
+#include "data/map/named_map.h"
 #include "data/sensors/taxel_array.h"
 
 namespace supertac {
