@@ -27,6 +27,101 @@ Estimate CompiledModel::estimate(const Tensor& inputs) const {
   return integers_ ? integers_->run(inputs) : plan_->run(inputs);
 }
 
+std::shared_ptr<const Plan> Compiler::plan(const SuperTac& network) {
+  const TracedPrediction traced(network, Tensor::zeros(network.input_shape(1)));
+  const Prediction& drawn = traced.drawn;
+  Compiler compiler(traced);
+  Plan& plan = *compiler.plan_;
+  plan.picture_ = compiler.map_of(drawn.picture);
+  if (drawn.predicted_error.defined()) plan.predicted_error_ = compiler.map_of(drawn.predicted_error);
+  if (drawn.latents.defined()) plan.latents_ = compiler.map_of(drawn.latents);
+  return compiler.plan_;
+}
+
+Compiler::Compiler(const TracedPrediction& traced) : TraceWalk(traced) {
+  const std::vector<TracedOp>& ops = traced.trace.ops();
+  for (std::size_t i = 0; i < ops.size(); ++i) {
+    const auto make = makers().find(ops[i].op);
+    if (make == makers().end())
+      throw std::logic_error("CompiledModel: no step computes the op " + std::string(ops[i].op) +
+                             "; models/inference/compiled/plan_steps.cpp lists those that have one");
+    takes_input(ops[i]);  // or throws
+    make->second(*this, ops[i]);
+    release_after(i);
+  }
+}
+
+const FeatureMap& Compiler::map_of(const Variable& x) const { return maps_.at(owner(x)); }
+
+static FeatureMap append(FeatureMap map, std::vector<FeatureMap>& all, Dim& size) {
+  constexpr Dim kLine = 64;  // a line of the cache in bytes
+  map.offset = size;
+  size += (map.image() + kLine - 1) / kLine * kLine;
+  all.push_back(map);
+  return map;
+}
+
+FeatureMap Plan::add_buffer(FeatureMap layout) { return append(layout, buffers_, workspace_); }
+
+// One of the free buffers with this layout, or a new one.
+static FeatureMap take(FeatureMap map, std::vector<FeatureMap>& free, std::vector<FeatureMap>& all,
+                       Dim& size) {
+  const auto old =
+      std::find_if(free.begin(), free.end(), [&](const FeatureMap& m) { return m.same_layout(map); });
+  if (old == free.end()) return append(map, all, size);
+  map = *old;
+  free.erase(old);
+  return map;
+}
+
+const FeatureMap& Compiler::new_map(const Variable& y) {
+  return maps_[y.node()] = take(layout_of(y), free_, plan_->buffers_, plan_->workspace_);
+}
+
+void Compiler::release_after(std::size_t op) {
+  std::erase_if(maps_, [&](const auto& value) {
+    if (read_after(value.first, op)) return false;
+    free_.push_back(value.second);
+    return true;
+  });
+}
+
+void Plan::clear_margins(const Block& block) const {
+  for (const FeatureMap& map : planes_) std::fill_n(block.begin(map), map.image(), real(0));
+  for (const FeatureMap& map : buffers_) fill_margin(map, block.images, real(0), block.begin(map));
+}
+
+void Plan::copy_out(const Block& block, const FeatureMap& map, Tensor& to, Dim first) const {
+  const Dim run = map.width * map.channels;
+  real* target = to.data() + first * map.height * run;
+  for (Dim n = 0; n < block.images; ++n) {
+    const real* line = block.first_pixel(map) + n * map.image();
+    for (Dim y = 0; y < map.height; ++y, line += map.line(), target += run) std::copy_n(line, run, target);
+  }
+}
+
+Estimate Plan::run(const Tensor& inputs) const {
+  const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
+  Estimate out{.picture = Tensor(Shape{count, picture_.height, picture_.width, 1}),
+               .predicted_error = {},
+               .latents = {}};
+  if (predicted_error_) out.predicted_error = Tensor(out.picture.shape());
+  if (latents_) out.latents = Tensor(Shape{count, latents_->channels});
+  const Dim images = std::min(count, kBlock);
+  Tensor memory(Shape{scratch_ + workspace_ * images});
+  real* const workspace = memory.data() + scratch_;
+  for (Dim first = 0; first < count; first += kBlock) {
+    const Block block{inputs.data() + first * size, std::min(kBlock, count - first), workspace,
+                      memory.data()};
+    if (first == 0 || block.images != kBlock) clear_margins(block);
+    for (const PlanStep& step : steps_) step(block);
+    copy_out(block, picture_, out.picture, first);
+    if (predicted_error_) copy_out(block, *predicted_error_, out.predicted_error, first);
+    if (latents_) copy_out(block, *latents_, out.latents, first);
+  }
+  return out;
+}
+
 static double square(real x) { return static_cast<double>(x) * static_cast<double>(x); }
 
 Ensemble::Ensemble(std::vector<CompiledModel> members) : members_(std::move(members)) {
