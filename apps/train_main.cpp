@@ -29,30 +29,6 @@ void declare(Arguments& a) {
 
 namespace {
 
-class TrainingRun {
- public:
-  TrainingRun(const Arguments& a, TrainingTask task, Ranks& ranks);
-  /// Until the last step or a signal. The state is saved either way; after the last step report and model are
-  /// written too. Returns the exit code.
-  int train();
-
- private:
-  TrainingCallbacks callbacks(Progress& progress);
-  void write_end();
-  std::string detail(const StepReport& report) const;
-  void warn_of_collapse(const StepReport& report);
-
-  const Arguments& a_;
-  TrainingTask task_;
-  OutputPath out_;
-  Trainer trainer_;
-  std::optional<RunFolder> folder_;
-  std::optional<LedgerFile> ledger_;
-  nlohmann::ordered_json description_;
-  bool warned_ = false;
-  std::optional<double> loss_, test_ssim_;  // as last logged
-};
-
 void check_agreement(const Trainer& trainer, const TrainingTask& task, Ranks& ranks) {
   std::map<std::string, std::string> mine = task.origin;
   mine["build"] = version() + " " + commit();
@@ -92,110 +68,126 @@ nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, cons
           {"steps", trainer.total_steps()}};
 }
 
-TrainingRun::TrainingRun(const Arguments& a, TrainingTask task, Ranks& ranks)
-    : a_(a),
-      task_(std::move(task)),
-      out_(a.output("out")),
-      trainer_(make_trainer(task_, a.text("resume"), ranks)),
-      description_(describe(a, trainer_, task_)) {
-  if (a_.given("ledger") && ranks.size() > 1)
-    throw UsageError("--ledger: of one process only; leave it out under mpirun");
-  if (!ranks.first()) return;
-  folder_.emplace(out_.path, a.force(), a.given("resume") ? std::optional(trainer_.step()) : std::nullopt);
-  folder_->write_settings(description_);
-  if (a_.given("ledger"))
-    ledger_.emplace(folder_->path(), a_.integer("ledger", 1, 1'000'000'000), trainer_, task_.origin);
-}
-
-int TrainingRun::train() {
-  a_.note(task_.counts);
-  for (const std::string& one : task_.remarks) a_.note("warning: " + one);
-  a_.note("training on " + std::to_string(task_.split.train.size()) + " windows, " +
-          std::to_string(trainer_.total_steps()) + " steps" +
-          (a_.given("resume") ? ", resumed at " + std::to_string(trainer_.step()) : ""));
-  for (const std::string& note : task_.notes) a_.note(note);
-  {
-    Progress progress(a_, "training", static_cast<std::uint64_t>(trainer_.total_steps()), "steps",
-                      static_cast<std::uint64_t>(trainer_.step()));
-    supertac::train(trainer_, task_, callbacks(progress));
+class TrainingRun {
+ public:
+  TrainingRun(const Arguments& a, TrainingTask task, Ranks& ranks)
+      : a_(a),
+        task_(std::move(task)),
+        out_(a.output("out")),
+        trainer_(make_trainer(task_, a.text("resume"), ranks)),
+        description_(describe(a, trainer_, task_)) {
+    if (a_.given("ledger") && ranks.size() > 1)
+      throw UsageError("--ledger: of one process only; leave it out under mpirun");
+    if (!ranks.first()) return;
+    folder_.emplace(out_.path, a.force(), a.given("resume") ? std::optional(trainer_.step()) : std::nullopt);
+    folder_->write_settings(description_);
+    if (a_.given("ledger"))
+      ledger_.emplace(folder_->path(), a_.integer("ledger", 1, 1'000'000'000), trainer_, task_.origin);
   }
-  const int code = trainer_.done() ? kExitOk : kExitFailed;
-  if (!folder_) return code;
-  write_end();
-  if (!trainer_.done()) {
-    a_.note("stopped at step " + std::to_string(trainer_.step()) + " of " +
-            std::to_string(trainer_.total_steps()) + "; continue with the same options and --resume " +
-            folder_->checkpoint_path());
+
+  /// Until the last step or a signal. The state is saved either way; after the last step report and model are
+  /// written too. Returns the exit code.
+  int train() {
+    a_.note(task_.counts);
+    for (const std::string& one : task_.remarks) a_.note("warning: " + one);
+    a_.note("training on " + std::to_string(task_.split.train.size()) + " windows, " +
+            std::to_string(trainer_.total_steps()) + " steps" +
+            (a_.given("resume") ? ", resumed at " + std::to_string(trainer_.step()) : ""));
+    for (const std::string& note : task_.notes) a_.note(note);
+    {
+      Progress progress(a_, "training", static_cast<std::uint64_t>(trainer_.total_steps()), "steps",
+                        static_cast<std::uint64_t>(trainer_.step()));
+      supertac::train(trainer_, task_, callbacks(progress));
+    }
+    const int code = trainer_.done() ? kExitOk : kExitFailed;
+    if (!folder_) return code;
+    write_end();
+    if (!trainer_.done()) {
+      a_.note("stopped at step " + std::to_string(trainer_.step()) + " of " +
+              std::to_string(trainer_.total_steps()) + "; continue with the same options and --resume " +
+              folder_->checkpoint_path());
+      return code;
+    }
+    a_.print(out_.path + ": " + std::to_string(trainer_.model().parameter_count()) + " parameters after " +
+             std::to_string(trainer_.step()) + " steps; curves in " + folder_->path() + "/report.html");
+    description_["out"] = out_.path;
+    a_.write_json(description_);
     return code;
   }
-  a_.print(out_.path + ": " + std::to_string(trainer_.model().parameter_count()) + " parameters after " +
-           std::to_string(trainer_.step()) + " steps; curves in " + folder_->path() + "/report.html");
-  description_["out"] = out_.path;
-  a_.write_json(description_);
-  return code;
-}
 
-// Report and settings with the time that it took, and the model.
-void TrainingRun::write_end() {
-  description_["provenance"] = full_provenance();
-  if (trainer_.done()) {
-    const std::string finished = folder_->path() + "/model.safetensors";
-    const auto origin = trained_origin(trainer_, task_);
-    if (task_.finds_interval_factor && origin.contains("interval_factor"))
-      a_.note("intervals of " + origin.at("interval_factor") +
-              " (--interval-factor) hold 90 % of the tested groups' pixels at each height of the truth");
-    if (trainer_.best_epoch() > 0)
-      a_.note("the network of epoch " + std::to_string(trainer_.best_epoch()) + " of " +
-              std::to_string(trainer_.step() / trainer_.steps_per_epoch()) +
-              " is kept: it drew the group that was held out best (contact SSIM " +
-              format(trainer_.best_score(), 3) + ")");
-    save_trained(trainer_, finished, origin);
-    out_.path = publish(finished, out_);
-    description_["content"] = hash_of_file(out_.path);
+ private:
+  // Report and settings with the time that it took, and the model.
+  void write_end() {
+    description_["provenance"] = full_provenance();
+    if (trainer_.done()) {
+      const std::string finished = folder_->path() + "/model.safetensors";
+      const auto origin = trained_origin(trainer_, task_);
+      if (task_.finds_interval_factor && origin.contains("interval_factor"))
+        a_.note("intervals of " + origin.at("interval_factor") +
+                " (--interval-factor) hold 90 % of the tested groups' pixels at each height of the truth");
+      if (trainer_.best_epoch() > 0)
+        a_.note("the network of epoch " + std::to_string(trainer_.best_epoch()) + " of " +
+                std::to_string(trainer_.step() / trainer_.steps_per_epoch()) +
+                " is kept: it drew the group that was held out best (contact SSIM " +
+                format(trainer_.best_score(), 3) + ")");
+      save_trained(trainer_, finished, origin);
+      out_.path = publish(finished, out_);
+      description_["content"] = hash_of_file(out_.path);
+    }
+    folder_->write_settings(description_);
+    folder_->write_report();
   }
-  folder_->write_settings(description_);
-  folder_->write_report();
-}
 
-TrainingCallbacks TrainingRun::callbacks(Progress& progress) {
-  TrainingCallbacks callbacks{.stop = interrupted};
-  callbacks.checkpoint_every = a_.integer("checkpoint-every", 1, 1'000'000'000);
-  callbacks.step = [this, &progress](const StepReport& report) {
-    if (ledger_) ledger_->after_step();
-    if (report.collapsed && !std::exchange(warned_, true)) warn_of_collapse(report);
-    progress.update(static_cast<std::uint64_t>(report.step), detail(report));
-  };
-  if (!folder_) return callbacks;
-  callbacks.checkpoint = folder_->checkpoint_path();
-  callbacks.seconds_before = folder_->seconds();
-  callbacks.log = [this](const LogLine& line) {
-    loss_ = line.total;
-    if (line.step % trainer_.steps_per_epoch() == 0) test_ssim_ = line.test_ssim;
-    if (!folder_->log(line))
-      a_.note(folder_->path() + "/log.csv: cannot write; the log is kept in memory only");
-  };
-  return callbacks;
-}
+  TrainingCallbacks callbacks(Progress& progress) {
+    TrainingCallbacks callbacks{.stop = interrupted};
+    callbacks.checkpoint_every = a_.integer("checkpoint-every", 1, 1'000'000'000);
+    callbacks.step = [this, &progress](const StepReport& report) {
+      if (ledger_) ledger_->after_step();
+      if (report.collapsed && !std::exchange(warned_, true)) warn_of_collapse(report);
+      progress.update(static_cast<std::uint64_t>(report.step), detail(report));
+    };
+    if (!folder_) return callbacks;
+    callbacks.checkpoint = folder_->checkpoint_path();
+    callbacks.seconds_before = folder_->seconds();
+    callbacks.log = [this](const LogLine& line) {
+      loss_ = line.total;
+      if (line.step % trainer_.steps_per_epoch() == 0) test_ssim_ = line.test_ssim;
+      if (!folder_->log(line))
+        a_.note(folder_->path() + "/log.csv: cannot write; the log is kept in memory only");
+    };
+    return callbacks;
+  }
 
-std::string TrainingRun::detail(const StepReport& report) const {
-  const std::int64_t epoch = trainer_.steps_per_epoch();
-  std::string text = "epoch " + std::to_string((report.step - 1) / epoch + 1) + "/" +
-                     std::to_string(trainer_.total_steps() / epoch) + " loss " +
-                     format(loss_.value_or(report.total), 3);
-  if (test_ssim_) text += " test SSIM " + format(*test_ssim_, 3);
-  return text;
-}
+  std::string detail(const StepReport& report) const {
+    const std::int64_t epoch = trainer_.steps_per_epoch();
+    std::string text = "epoch " + std::to_string((report.step - 1) / epoch + 1) + "/" +
+                       std::to_string(trainer_.total_steps() / epoch) + " loss " +
+                       format(loss_.value_or(report.total), 3);
+    if (test_ssim_) text += " test SSIM " + format(*test_ssim_, 3);
+    return text;
+  }
 
-void TrainingRun::warn_of_collapse(const StepReport& report) {
-  const bool idle = trainer_.objective().latents() > 0 && report.active_latents == 0;
-  const std::string advice =
-      idle ? "no latent number tells windows apart; if that stays so, lower --beta (now " +
-                 format(trainer_.objective().recipe().loss.beta) + ") or "
-           : "the pictures are the same for every input, or far too strong; if that stays so, lower ";
-  a_.note("step " + std::to_string(report.step) + ": " + advice + "--learning-rate (now " +
-          format(trainer_.objective().recipe().learning_rate) +
-          "); early in a run it often mends itself: watch SSIM");
-}
+  void warn_of_collapse(const StepReport& report) {
+    const bool idle = trainer_.objective().latents() > 0 && report.active_latents == 0;
+    const std::string advice =
+        idle ? "no latent number tells windows apart; if that stays so, lower --beta (now " +
+                   format(trainer_.objective().recipe().loss.beta) + ") or "
+             : "the pictures are the same for every input, or far too strong; if that stays so, lower ";
+    a_.note("step " + std::to_string(report.step) + ": " + advice + "--learning-rate (now " +
+            format(trainer_.objective().recipe().learning_rate) +
+            "); early in a run it often mends itself: watch SSIM");
+  }
+
+  const Arguments& a_;
+  TrainingTask task_;
+  OutputPath out_;
+  Trainer trainer_;
+  std::optional<RunFolder> folder_;
+  std::optional<LedgerFile> ledger_;
+  nlohmann::ordered_json description_;
+  bool warned_ = false;
+  std::optional<double> loss_, test_ssim_;  // as last logged
+};
 
 }  // namespace
 

@@ -25,37 +25,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A training with a ledger, made again from the states that it kept.
-class Repetition {
- public:
-  /// Of the model's run folder, as its file says that it was trained. Throws FileError when that does not say
-  /// it, when there is no ledger, or when --data holds other recordings.
-  Repetition(const Arguments& a, const std::string& model);
-
-  struct Segment {
-    std::int64_t from, to;
-  };
-  /// From kept state to kept state. Throws FileError when one is missing.
-  std::vector<Segment> segments() const;
-
-  /// Goes to the last kept state at or before `step`; what it returns is how the state differs from its line.
-  std::optional<LedgerDifference> start(std::int64_t step);
-  /// Makes a step, by `make` where it is given, and compares with the ledger where that has a line.
-  std::optional<LedgerDifference> make_step(const std::function<void()>& make = {});
-  /// The line that the last step gave, if any.
-  const std::optional<LedgerLine>& line() const { return line_; }
-
-  Trainer& trainer() { return *trainer_; }
-
- private:
-  std::string folder_;
-  Ledger ledger_;
-  TrainingTask task_;
-  std::optional<Trainer> trainer_;
-  std::optional<LedgerWriter> writer_;
-  std::optional<LedgerLine> line_;
-};
-
 void check_recordings(const Arguments& a, const Recipe& recipe, const std::string& path) {
   const SafetensorsFile file = SafetensorsFile::read(path);
   const auto provenance = file.metadata().find(kProvenanceKey);
@@ -74,51 +43,76 @@ TrainingTask task_of(const Arguments& a, const std::string& path) {
   return window_task(recipe, folders_of(a));
 }
 
-Repetition::Repetition(const Arguments& a, const std::string& model)
-    : folder_(RunFolder::folder_of(model)),
-      ledger_(Ledger::read(LedgerFile::path_in(folder_))),
-      task_(task_of(a, model)) {
-  trainer_.emplace(*task_.windows, task_.split.train, std::move(task_.objective));
-}
-
-std::vector<Repetition::Segment> Repetition::segments() const {
-  const std::int64_t total = trainer_->total_steps(), apart = LedgerFile::apart(ledger_.every, total);
-  std::vector<Segment> segments;
-  for (std::int64_t from = 0; from < total; from += apart) {
-    if (!std::filesystem::exists(LedgerFile::state_path(folder_, from)))
-      throw FileError(LedgerFile::state_path(folder_, from), "is missing; the ledger says that it was kept");
-    segments.push_back({from, std::min(from + apart, total)});
+/// A training with a ledger, made again from the states that it kept.
+class Repetition {
+ public:
+  /// Of the model's run folder, as its file says that it was trained. Throws FileError when that does not say
+  /// it, when there is no ledger, or when --data holds other recordings.
+  Repetition(const Arguments& a, const std::string& model)
+      : folder_(RunFolder::folder_of(model)),
+        ledger_(Ledger::read(LedgerFile::path_in(folder_))),
+        task_(task_of(a, model)) {
+    trainer_.emplace(*task_.windows, task_.split.train, std::move(task_.objective));
   }
-  return segments;
-}
 
-std::optional<LedgerDifference> Repetition::start(std::int64_t step) {
-  const std::int64_t total = trainer_->total_steps(), apart = LedgerFile::apart(ledger_.every, total);
-  const std::int64_t kept = step == total ? total : step / apart * apart;
-  trainer_->restore(LedgerFile::state_path(folder_, kept), task_.origin);
-  const std::optional<LedgerLine> line = ledger_.at(kept);
-  writer_.emplace(*trainer_, ledger_.every, line ? &*line : nullptr);
-  line_.reset();
-  if (!line) return std::nullopt;  // the beginning, which follows from the seed
-  LedgerLine mine = *line;
-  mine.tensors = hashes_of(*trainer_);
-  return difference(ledger_, *line, mine);
-}
-
-std::optional<LedgerDifference> Repetition::make_step(const std::function<void()>& make) {
-  stop_if_interrupted();
-  const std::int64_t before = trainer_->step();
-  if (make) {
-    make();
-  } else {
-    trainer_->train_step();
+  struct Segment {
+    std::int64_t from, to;
+  };
+  /// From kept state to kept state. Throws FileError when one is missing.
+  std::vector<Segment> segments() const {
+    const std::int64_t total = trainer_->total_steps(), apart = LedgerFile::apart(ledger_.every, total);
+    std::vector<Segment> segments;
+    for (std::int64_t from = 0; from < total; from += apart) {
+      if (!std::filesystem::exists(LedgerFile::state_path(folder_, from)))
+        throw FileError(LedgerFile::state_path(folder_, from),
+                        "is missing; the ledger says that it was kept");
+      segments.push_back({from, std::min(from + apart, total)});
+    }
+    return segments;
   }
-  line_ = writer_->after_step();
-  if (!line_) return std::nullopt;
-  const std::optional<LedgerLine> theirs = ledger_.at(line_->step);
-  if (!theirs) return LedgerDifference{before, line_->step, "a line that is missing", false};
-  return difference(ledger_, *theirs, *line_);
-}
+
+  /// Goes to the last kept state at or before `step`; what it returns is how the state differs from its line.
+  std::optional<LedgerDifference> start(std::int64_t step) {
+    const std::int64_t total = trainer_->total_steps(), apart = LedgerFile::apart(ledger_.every, total);
+    const std::int64_t kept = step == total ? total : step / apart * apart;
+    trainer_->restore(LedgerFile::state_path(folder_, kept), task_.origin);
+    const std::optional<LedgerLine> line = ledger_.at(kept);
+    writer_.emplace(*trainer_, ledger_.every, line ? &*line : nullptr);
+    line_.reset();
+    if (!line) return std::nullopt;  // the beginning, which follows from the seed
+    LedgerLine mine = *line;
+    mine.tensors = hashes_of(*trainer_);
+    return difference(ledger_, *line, mine);
+  }
+
+  /// Makes a step, by `make` where it is given, and compares with the ledger where that has a line.
+  std::optional<LedgerDifference> make_step(const std::function<void()>& make = {}) {
+    stop_if_interrupted();
+    const std::int64_t before = trainer_->step();
+    if (make) {
+      make();
+    } else {
+      trainer_->train_step();
+    }
+    line_ = writer_->after_step();
+    if (!line_) return std::nullopt;
+    const std::optional<LedgerLine> theirs = ledger_.at(line_->step);
+    if (!theirs) return LedgerDifference{before, line_->step, "a line that is missing", false};
+    return difference(ledger_, *theirs, *line_);
+  }
+  /// The line that the last step gave, if any.
+  const std::optional<LedgerLine>& line() const { return line_; }
+
+  Trainer& trainer() { return *trainer_; }
+
+ private:
+  std::string folder_;
+  Ledger ledger_;
+  TrainingTask task_;
+  std::optional<Trainer> trainer_;
+  std::optional<LedgerWriter> writer_;
+  std::optional<LedgerLine> line_;
+};
 
 std::string text_of(const LedgerDifference& d) {
   const std::string where =
