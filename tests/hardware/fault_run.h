@@ -15,15 +15,14 @@ struct FaultVerdict {
   std::string broken;     ///< the promise that was broken; empty when all held
   std::string altered;    ///< a damaged move that Marlin's 8-bit XOR let through; no host can see it
   std::string error;      ///< of a run that was not complete
-  double simulated_s = 0;
   MarlinLink::Counters printer;
   bool realtime = true;  ///< M114 R
-  std::uint64_t frames = 0, missing = 0, left_out = 0;
-  std::uint64_t compared = 0;  ///< recorded frames whose position was compared with the truth
-  std::string doubt;           ///< what the recordings say of themselves; "incomplete" where that is all
-  double named_mm_s = 0, true_mm_s = 0;  ///< of the last pass; 0: nothing tells
-  double worst_mm = 0;                   ///< how far a recorded frame is from where it was made, at worst
-  double worst_trusted_mm = 0;           ///< the same of recordings without doubt
+  std::uint64_t missing = 0, left_out = 0;
+  std::uint64_t compared = 0;   ///< recorded frames whose position was compared with the truth
+  std::string doubt;            ///< what the recordings say of themselves; "incomplete" where that is all
+  double named_mm_s = 0;        ///< of the last pass
+  double worst_mm = 0;          ///< how far a recorded frame is from where it was made, at worst
+  double worst_trusted_mm = 0;  ///< the same of recordings without doubt
 };
 
 /// A rig and a plan by seed: three firmwares, what another job left on, damaged bytes up to 0.2 %, boards,
@@ -31,7 +30,6 @@ struct FaultVerdict {
 /// stop or pause, resets. A fifth of the seeds: nothing but chunks of an adapter.
 struct DrawnRun {
   explicit DrawnRun(std::uint64_t seed);
-  bool only_chunks;
   RigSettings rig;
   PalpationPlan plan{.passes = 1, .slide = 40};
   Point3 origin{99.7, 101.17, 99.81};

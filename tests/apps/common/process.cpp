@@ -58,6 +58,7 @@ RunningProcess::RunningProcess(const std::string& program, const std::vector<std
     const rlimit limit{bytes, bytes};
     setrlimit(RLIMIT_FSIZE, &limit);
   }
+  if (options.nobody && getuid() == 0 && (setgid(65534) != 0 || setuid(65534) != 0)) _exit(126);
   execv(argv[0], argv.data());
   _exit(127);
 }

@@ -6,18 +6,15 @@
 // that send in bursts, and hosts that stall. One table of counts on stdout; exit 1 when anything was found.
 // Run it as an ordinary user or as root: as root the programs run as nobody, since evil values are also names
 // of outputs.
-#include <fcntl.h>
-#include <poll.h>
-#include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
+#include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -28,6 +25,7 @@
 #include <sstream>
 
 #include "io/files/file.h"
+#include "io/numbers/clock.h"
 #include "io/numbers/random.h"
 #include "tests/apps/common/process.h"
 #include "tests/apps/hostile/hostile.h"
@@ -69,11 +67,8 @@ struct Option {
   std::string name, value;
 };
 
-struct Run {
-  int status = 0;
-  bool hung = false;
-  long kilobytes = 0;
-  std::string error;
+struct Run : ProcessResult {
+  bool hung = false, large = false;
 };
 
 void prepare(const fs::path& folder) {
@@ -86,47 +81,25 @@ void prepare(const fs::path& folder) {
   std::ofstream(folder / "precious.stl") << "precious";
 }
 
-[[noreturn]] void become(const fs::path& folder, const std::vector<std::string>& words, int error) {
-  if (::chdir(folder.c_str()) != 0) _exit(126);
-  if (::getuid() == 0 && (::setgid(65534) != 0 || ::setuid(65534) != 0)) _exit(126);
-  // Who starts this behind nohup or in a script's background leaves some of them ignored.
-  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) ::signal(signal, SIG_DFL);
-  const int nothing = ::open("/dev/null", O_RDWR);
-  dup2(nothing, 0), dup2(nothing, 1), dup2(error, 2);
-  std::vector<char*> argv;
-  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
-  argv.push_back(nullptr);
-  execv(argv[0], argv.data());
-  _exit(127);
+long largest_child_kilobytes() {
+  rusage usage{};
+  getrusage(RUSAGE_CHILDREN, &usage);
+  return usage.ru_maxrss;
 }
 
-// Ends it with SIGTERM after `seconds`; what then does not end within kHangS hangs.
+// Ends it with `signal` after `seconds`; what then does not end within kHangS hangs.
 Run run(const fs::path& folder, const std::vector<std::string>& words, double seconds, int signal = SIGTERM) {
-  int pipe[2];
-  if (::pipe2(pipe, O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
-  const pid_t child = fork();
-  if (child == 0) become(folder, words, pipe[1]);
-  ::close(pipe[1]);
+  const long before = largest_child_kilobytes();
   Run result;
-  const auto begin = std::chrono::steady_clock::now();
-  bool asked = false, ended = false;
-  rusage usage{};
-  while (!ended) {
-    pollfd reading{pipe[0], POLLIN, 0};
-    char bytes[4096];
-    if (poll(&reading, 1, 5) == 1) {
-      const ssize_t count = ::read(pipe[0], bytes, sizeof bytes);
-      if (count > 0 && result.error.size() < 100'000)
-        result.error.append(bytes, static_cast<std::size_t>(count));
-      if (count == 0) usleep(1000);
-    }
-    ended = wait4(child, &result.status, WNOHANG, &usage) == child;
-    const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    if (!asked && took > seconds) kill(child, signal), asked = true;
-    if (!result.hung && took > seconds + kHangS) kill(child, SIGKILL), result.hung = true;
+  RunningProcess process(words[0], {words.begin() + 1, words.end()}, {.folder = folder, .nobody = true});
+  const double begin = seconds_of(CLOCK_MONOTONIC);
+  for (bool asked = false; !process.ended(); usleep(2000)) {
+    const double took = seconds_of(CLOCK_MONOTONIC) - begin;
+    if (!asked && took > seconds) process.send(signal), asked = true;
+    if (!result.hung && took > seconds + kHangS) process.send(SIGKILL), result.hung = true;
   }
-  ::close(pipe[0]);
-  result.kilobytes = usage.ru_maxrss;
+  static_cast<ProcessResult&>(result) = process.wait();
+  result.large = before <= kMostKilobytes && largest_child_kilobytes() > kMostKilobytes;
   return result;
 }
 
@@ -134,8 +107,7 @@ Run run(const fs::path& folder, const std::vector<std::string>& words, double se
 void run_whole(const fs::path& folder, std::vector<std::string> words) {
   words[0] = SUPERTAC_BIN "/supertac-" + words[0];
   const Run whole = run(folder, words, 60);
-  if (!WIFEXITED(whole.status) || WEXITSTATUS(whole.status) != 0)
-    throw std::runtime_error(words[0] + ": " + whole.error);
+  if (whole.code != 0) throw std::runtime_error(words[0] + ": " + whole.error);
 }
 
 std::vector<Option> options_of(const std::string& program) {
@@ -186,18 +158,14 @@ void judge(const Run& result, const fs::path& folder, const std::vector<std::str
     std::cerr << what << ": " << line << "\n  " << result.error.substr(0, 300) << '\n';
   };
   if (result.hung) return found("hangs");
-  if (WIFEXITED(result.status)) ++counts["exit " + std::to_string(WEXITSTATUS(result.status))];
-  if (WIFEXITED(result.status) && WEXITSTATUS(result.status) == 126)
-    throw std::runtime_error("cannot start " + line);
-  const auto asked = [](int signal) { return signal == SIGTERM || signal == SIGINT || signal == SIGHUP; };
-  if (WIFSIGNALED(result.status) && !asked(WTERMSIG(result.status))) found("crashes");
-  if (WIFEXITED(result.status) && WEXITSTATUS(result.status) > 126 &&
-      !asked(WEXITSTATUS(result.status) - 128))
-    found("crashes");
+  ++counts["exit " + std::to_string(result.code)];
+  if (result.code == 126) throw std::runtime_error("cannot start " + line);
+  const int signal = result.code - 128;
+  if (result.code > 126 && signal != SIGTERM && signal != SIGINT && signal != SIGHUP) found("crashes");
   if (result.error.find("Sanitizer") != std::string::npos ||
       result.error.find("runtime error:") != std::string::npos)
     found("crashes");
-  if (result.kilobytes > kMostKilobytes) found("above 1 GB");
+  if (result.large) found("above 1 GB");
   for (const char* raw :
        {"what():", "filesystem error", "[json.", "std::", "basic_string", "terminate called"})
     if (result.error.find(raw) != std::string::npos) return found("raw exceptions");
@@ -306,7 +274,7 @@ int main_of(const std::string& mode, std::uint64_t n, std::uint64_t seed) {
                              folder / "precious", folder / "precious.stl"})
       if (::chown(path.c_str(), 65534, 65534) != 0) throw std::runtime_error("chown " + path.string());
   const Run start = run(folder, {SUPERTAC_BIN "/supertac-info", "--version"}, 60);
-  if (!WIFEXITED(start.status) || WEXITSTATUS(start.status) != 0) {
+  if (start.code != 0) {
     fs::remove_all(folder);
     std::cerr << "skipped: nobody but root may run what is in " SUPERTAC_BIN "\n";
     return kSkipped;
@@ -369,5 +337,8 @@ int main(int argc, char** argv) {
               << " words\n";
     return 2;
   }
+  // Who starts this behind nohup or in a script's background leaves some of them ignored.
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) std::signal(signal, SIG_DFL);
+  if (std::freopen("/dev/null", "r", stdin) == nullptr) return 2;
   return supertac::main_of(argv[1], std::stoull(argv[2]), std::stoull(argv[3]));
 }

@@ -66,24 +66,27 @@ TEST(MarlinLine, RefusesWhatMarlinWouldCut) {
 }
 
 TEST(MarlinLine, RepliesAreClassified) {
-  EXPECT_EQ(parse_reply("ok").kind, ReplyKind::ok);
-  EXPECT_EQ(parse_reply("ok P15 B3").kind, ReplyKind::ok);
-  EXPECT_EQ(parse_reply("okay").kind, ReplyKind::other);
+  using enum ReplyKind;
+  const std::pair<const char*, ReplyKind> lines[] = {
+      {"ok", ok},
+      {"ok P15 B3", ok},
+      {"okay", other},
+      {"start", start},
+      {"wait", wait},
+      {"echo:busy: processing", busy},
+      {"echo:busy: paused for user", paused},
+      {"echo:Unknown command: \"1 G1\"", unknown_command},
+      {"Error:Printer halted. kill() called!", fatal},
+      {"Error:Thermal Runaway, system stopped! Heater_ID: 0", fatal},
+      // Said unasked, in the middle of an answer.
+      {"ok N3 Error:Printer halted. kill() called!", fatal},
+      {"X:1.00 echo:busy: paused for user", paused}};
+  for (const auto& [line, kind] : lines) EXPECT_EQ(parse_reply(line).kind, kind) << line;
+  for (const char* said : {"//action:resumed", "//action:notification stop", "echo:action:cancel"})
+    EXPECT_NE(parse_reply(said).kind, interrupted) << said;
   EXPECT_EQ(parse_reply("Resend: 13").number, 13);
   EXPECT_EQ(parse_reply("Error:checksum mismatch, Last Line: 12").number, 12);
   EXPECT_EQ(parse_reply("Error:checksum mismatch, Last Line: 1x").number, std::nullopt);
-  EXPECT_EQ(parse_reply("Error:Printer halted. kill() called!").kind, ReplyKind::fatal);
-  EXPECT_EQ(parse_reply("Error:Thermal Runaway, system stopped! Heater_ID: 0").kind, ReplyKind::fatal);
-  EXPECT_EQ(parse_reply("echo:busy: processing").kind, ReplyKind::busy);
-  EXPECT_EQ(parse_reply("echo:busy: paused for user").kind, ReplyKind::paused);
-  EXPECT_EQ(parse_reply("echo:Unknown command: \"1 G1\"").kind, ReplyKind::unknown_command);
-  EXPECT_EQ(parse_reply("start").kind, ReplyKind::start);
-  // Said unasked, in the middle of an answer.
-  EXPECT_EQ(parse_reply("ok N3 Error:Printer halted. kill() called!").kind, ReplyKind::fatal);
-  EXPECT_EQ(parse_reply("X:1.00 echo:busy: paused for user").kind, ReplyKind::paused);
-  for (const char* said : {"//action:resumed", "//action:notification stop", "echo:action:cancel", "ok"})
-    EXPECT_NE(parse_reply(said).kind, ReplyKind::interrupted) << said;
-  EXPECT_EQ(parse_reply("wait").kind, ReplyKind::wait);
 }
 
 TEST(MarlinLine, ADamagedPositionIsNoPosition) {
