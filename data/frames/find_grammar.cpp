@@ -241,6 +241,69 @@ void say_what_was_taken_away(const std::vector<std::string>& raw, TextGrammar& g
   if (!what.empty()) grammar.says.push_back("taken away: " + joined(what, ", "));
 }
 
+/// Fills what is known of each slot, by the frames of these lines; false where they explain less than two
+/// fifths of the lines.
+bool fill_slots(const std::vector<std::string>& lines, TextGrammar& grammar) {
+  FrameFormat read = grammar.format;
+  read.checksum = "none";  // has been taken away
+  TextFrames frames(read);
+  struct Frame {
+    std::vector<double> values;
+    std::vector<bool> words, wall;
+    std::vector<std::string> before, text, unit;
+    std::vector<std::size_t> line;
+  };
+  std::vector<Frame> all;
+  std::vector<std::vector<std::string>> all_words;  // lines that name what follows
+  double written = 0;                               // lines that are not empty
+  std::map<std::vector<bool>, std::size_t> forms;   // which cells are words
+  for (const std::string& line : lines) {
+    written += line.empty() ? 0 : 1;
+    if (frames.push(line) != TextFrames::Result::frame) continue;
+    Frame frame;
+    for (const TextSlot& slot : frames.slots()) {
+      frame.values.push_back(slot.value), frame.words.push_back(slot.words), frame.wall.push_back(slot.wall);
+      frame.before.emplace_back(slot.before), frame.text.emplace_back(slot.text);
+      frame.unit.emplace_back(slot.unit), frame.line.push_back(slot.line);
+    }
+    if (std::ranges::count(frame.words, false) == 0) {
+      all_words.push_back(std::move(frame.text));
+      continue;
+    }
+    ++forms[frame.words];
+    all.push_back(std::move(frame));
+  }
+  if (forms.empty()) return false;
+  const std::vector<bool> usual =
+      std::ranges::max_element(forms, {}, [](const auto& f) {
+        return f.second * static_cast<std::size_t>(std::ranges::count(f.first, false));
+      })->first;
+  std::erase_if(all, [&](const Frame& frame) { return frame.words != usual; });
+  if (all.empty() || static_cast<double>(all.size()) * grammar.format.lines_per_frame < 0.4 * written)
+    return false;
+  const Frame& sample = all[all.size() / 2];
+  grammar.words = usual, grammar.wall = sample.wall;
+  grammar.before = sample.before, grammar.sample = sample.text, grammar.line = sample.line;
+  for (auto& names : all_words)
+    if (names.size() == usual.size()) grammar.names = std::move(names);
+  std::map<std::vector<std::string>, std::size_t> units;
+  grammar.columns.resize(usual.size()), grammar.decimals.resize(usual.size());
+  for (const Frame& frame : all) {
+    ++units[frame.unit];
+    for (std::size_t c = 0; c < usual.size(); ++c) {
+      grammar.columns[c].push_back(frame.values[c]);
+      const std::size_t point = frame.text[c].find_first_of(grammar.format.decimal == ',' ? ",." : ".");
+      if (point != std::string::npos)
+        grammar.decimals[c] =
+            std::max(grammar.decimals[c], static_cast<int>(frame.text[c].size() - point - 1));
+    }
+  }
+  if (20 * std::ranges::max_element(units, {}, [](const auto& u) { return u.second; })->second <
+      19 * all.size())
+    grammar.doubt = "the same number has another unit, or brackets, at times: what they mean is not known";
+  return true;
+}
+
 }  // namespace
 
 std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
@@ -290,65 +353,7 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
                     ", part thousands, or are points or parts of a list: let the sensor send plain numbers";
   if (grammar.format.lines_per_frame > 1) grammar.format.separator = 0;
   say_what_was_taken_away(raw, grammar);
-
-  FrameFormat read = grammar.format;
-  read.checksum = "none";  // has been taken away
-  TextFrames frames(read);
-  struct Frame {
-    std::vector<double> values;
-    std::vector<bool> words, wall;
-    std::vector<std::string> before, text, unit;
-    std::vector<std::size_t> line;
-  };
-  std::vector<Frame> all;
-  std::vector<std::vector<std::string>> all_words;  // lines that name what follows
-  double written = 0;                               // lines that are not empty
-  std::map<std::vector<bool>, std::size_t> forms;   // which cells are words
-  for (const std::string& line : lines) {
-    written += line.empty() ? 0 : 1;
-    if (frames.push(line) != TextFrames::Result::frame) continue;
-    Frame frame;
-    for (const TextSlot& slot : frames.slots()) {
-      frame.values.push_back(slot.value), frame.words.push_back(slot.words), frame.wall.push_back(slot.wall);
-      frame.before.emplace_back(slot.before), frame.text.emplace_back(slot.text);
-      frame.unit.emplace_back(slot.unit), frame.line.push_back(slot.line);
-    }
-    if (std::ranges::count(frame.words, false) == 0) {
-      all_words.push_back(std::move(frame.text));
-      continue;
-    }
-    ++forms[frame.words];
-    all.push_back(std::move(frame));
-  }
-  if (forms.empty()) return std::nullopt;
-  const std::vector<bool> usual =
-      std::ranges::max_element(forms, {}, [](const auto& f) {
-        return f.second * static_cast<std::size_t>(std::ranges::count(f.first, false));
-      })->first;
-  std::erase_if(all, [&](const Frame& frame) { return frame.words != usual; });
-  if (all.empty() || static_cast<double>(all.size()) * grammar.format.lines_per_frame < 0.4 * written)
-    return std::nullopt;
-  const Frame& sample = all[all.size() / 2];
-  grammar.words = usual, grammar.wall = sample.wall;
-  grammar.before = sample.before, grammar.sample = sample.text, grammar.line = sample.line;
-  for (auto& names : all_words)
-    if (names.size() == usual.size()) grammar.names = std::move(names);
-  std::map<std::vector<std::string>, std::size_t> units;
-  grammar.columns.resize(usual.size()), grammar.decimals.resize(usual.size());
-  for (const Frame& frame : all) {
-    ++units[frame.unit];
-    for (std::size_t c = 0; c < usual.size(); ++c) {
-      grammar.columns[c].push_back(frame.values[c]);
-      const std::size_t point = frame.text[c].find_first_of(decimal == ',' ? ",." : ".");
-      if (point != std::string::npos)
-        grammar.decimals[c] =
-            std::max(grammar.decimals[c], static_cast<int>(frame.text[c].size() - point - 1));
-    }
-  }
-  if (20 * std::ranges::max_element(units, {}, [](const auto& u) { return u.second; })->second <
-      19 * all.size())
-    grammar.doubt = "the same number has another unit, or brackets, at times: what they mean is not known";
-  return grammar;
+  return fill_slots(lines, grammar) ? std::optional(std::move(grammar)) : std::nullopt;
 }
 
 }  // namespace supertac

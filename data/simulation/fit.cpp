@@ -22,40 +22,31 @@ namespace {
 constexpr double kSeconds = 30, kPenalty = 0.3, kMostUnlike = 8, kMostOfPrior = 0.6, kLeastFittedNoise = 2e-4;
 constexpr std::size_t kNearest = 60;
 
-// A number of a body as it is regressed: drawn evenly in this form, and back.
+// A number of a body as it is regressed: drawn evenly from `least` to `most` in this form, and its value
+// there.
 struct Form {
   const char* key;
+  double Body::*of;
   double least, most;
-  void (*set)(Body&, double form, double pitch_mm);
   double (*value)(double form, double pitch_mm);
   bool may_be_none = false;  // not every array has it: what cannot be told is left out
 };
-double exp_of(double form) { return same_bits::exp(form); }
+double itself(double form, double) { return form; }
+double exp_of(double form, double) { return same_bits::exp(form); }
 // Of a knee k, 1 / (1 + k) is 0 for a linear response and tends to 1 where the lightest touch saturates.
-const Form kForms[] = {
-    {"skin_mm", same_bits::log(0.2), same_bits::log(1.5),
-     [](Body& b, double f, double p) { b.skin_mm = p * exp_of(f); },
-     [](double f, double p) { return p * exp_of(f); }},
-    {"knee", 0.001, 0.85, [](Body& b, double f, double) { b.knee = (1 - f) / f; },
-     [](double f, double) { return (1 - std::clamp(f, 0.001, 0.95)) / std::clamp(f, 0.001, 0.95); }},
-    {"crosstalk_rows", 0, 0.5, [](Body& b, double f, double) { b.crosstalk_rows = f; },
-     [](double f, double) { return std::max(0.0, f); }, true},
-    {"crosstalk_columns", 0, 0.5, [](Body& b, double f, double) { b.crosstalk_columns = f; },
-     [](double f, double) { return std::max(0.0, f); }, true},
-    {"hysteresis_s", same_bits::log(0.01), 0, [](Body& b, double f, double) { b.hysteresis_s = exp_of(f); },
-     [](double f, double) { return exp_of(f); }},
-    {"creep", 0.001, 0.4, [](Body& b, double f, double) { b.creep = f; },
-     [](double f, double) { return std::max(0.001, f); }, true},
-    {"creep_s", same_bits::log(0.5), same_bits::log(10),
-     [](Body& b, double f, double) { b.creep_s = exp_of(f); }, [](double f, double) { return exp_of(f); },
-     true}};
+const Form kForms[] = {{"skin_mm", &Body::skin_mm, same_bits::log(0.2), same_bits::log(1.5),
+                        [](double f, double pitch_mm) { return pitch_mm * same_bits::exp(f); }},
+                       {"knee", &Body::knee, 0.001, 0.85, [](double f, double) { return (1 - f) / f; }},
+                       {"crosstalk_rows", &Body::crosstalk_rows, 0, 0.5, itself, true},
+                       {"crosstalk_columns", &Body::crosstalk_columns, 0, 0.5, itself, true},
+                       {"hysteresis_s", &Body::hysteresis_s, same_bits::log(0.01), 0, exp_of},
+                       {"creep", &Body::creep, 0.001, 0.4, itself, true},
+                       {"creep_s", &Body::creep_s, same_bits::log(0.5), same_bits::log(10), exp_of, true}};
 constexpr std::size_t kNumbers = std::size(kForms);
 
 // A number that the file states without an uncertainty is known, and is not looked for.
-std::optional<double> known(const Body& body, const std::string& key) {
-  if (body.uncertainty.contains(key)) return {};
-  const double value = body.*std::ranges::find(fitted_numbers(), key, &BodyNumber::key)->of;
-  return value != 0 ? std::optional(value) : std::nullopt;
+bool known(const Body& body, const Form& form) {
+  return !body.uncertainty.contains(form.key) && body.*form.of != 0;
 }
 
 // The inverse of a symmetric positive definite matrix [d][d], in place (Gauss-Jordan).
@@ -221,7 +212,7 @@ BodyFitter::BodyFitter(const Sensor& sensor, std::uint64_t seed) : sensor_(senso
     drawn.body.uncertainty = {};
     for (std::size_t k = 0; k < kNumbers; ++k) {
       forms[i].push_back(std::lerp(kForms[k].least, kForms[k].most, random.uniform(i * (kNumbers + 1) + k)));
-      if (!known(sensor.body, kForms[k].key)) kForms[k].set(drawn.body, forms[i].back(), pitch);
+      if (!known(sensor.body, kForms[k])) drawn.body.*kForms[k].of = kForms[k].value(forms[i].back(), pitch);
     }
     drawn.body.noise = 0.001 * same_bits::pow(10, random.uniform(i * (kNumbers + 1) + kNumbers));
     statistics[i] = touch_statistics(simulate_touching(drawn, kSeconds, seed * kSimulations + i));
@@ -260,8 +251,8 @@ BodyFit BodyFitter::operator()(const Recording& touches) const {
   const std::vector<double> predicted = (*regression_)(found);
   for (std::size_t k = 0; k < kNumbers; ++k) {
     const Form& form = kForms[k];
-    if (const auto stated = known(sensor_.body, form.key)) {
-      fit.numbers.push_back({form.key, *stated, 0, true});
+    if (known(sensor_.body, form)) {
+      fit.numbers.push_back({form.key, sensor_.body.*form.of, 0, true});
       continue;
     }
     const double deviation = regression_->deviation(k, predicted[k]);
@@ -278,8 +269,8 @@ BodyFit BodyFitter::operator()(const Recording& touches) const {
   creep.told = creep_s.told = creep.told && creep_s.told;
   for (std::size_t k = 0; k < kNumbers; ++k) {
     const FittedNumber& number = fit.numbers[k];
-    if (known(sensor_.body, number.key) || (kForms[k].may_be_none && !number.told)) continue;
-    kForms[k].set(fit.sensor.body, std::clamp(predicted[k], kForms[k].least, kForms[k].most), pitch);
+    if (known(sensor_.body, kForms[k]) || (kForms[k].may_be_none && !number.told)) continue;
+    fit.sensor.body.*kForms[k].of = number.value;
     fit.sensor.body.uncertainty[number.key] = number.deviation;
   }
   return fit;
