@@ -9,7 +9,7 @@
 #include "apps/evaluate/map_scores.h"
 #include "apps/evaluate/scoring.h"
 #include "data/recordings/recording.h"
-#include "data/windows/signal_remarks.h"
+#include "data/windows/windows.h"
 #include "io/files/file.h"
 #include "io/numbers/clock.h"
 #include "io/numbers/median.h"

@@ -289,24 +289,17 @@ void check(const PassSettings& pass, const SimulatorSettings& settings) {
                                 std::to_string(pass.trial));
 }
 
-// Moving average over the last `length` samples, or as many as there are.
-class MovingAverage {
- public:
-  explicit MovingAverage(int length) : length_(static_cast<std::size_t>(std::max(1, length))) {}
-  std::vector<double> operator()(const std::vector<double>& sample) {
-    recent_.push_back(sample);
-    if (recent_.size() > length_) recent_.pop_front();
-    std::vector<double> mean(sample.size());
-    for (const auto& s : recent_)
-      for (std::size_t k = 0; k < s.size(); ++k) mean[k] += s[k];
-    for (double& m : mean) m /= static_cast<double>(recent_.size());
-    return mean;
-  }
-
- private:
-  std::size_t length_;
-  std::deque<std::vector<double>> recent_;
-};
+// The mean of the newest sample and those before it, `length` in all or as many as there are.
+std::vector<double> averaged(const std::vector<double>& newest, std::size_t length,
+                             std::deque<std::vector<double>>& recent) {
+  recent.push_back(newest);
+  if (recent.size() > length) recent.pop_front();
+  std::vector<double> mean(newest.size());
+  for (const auto& sample : recent)
+    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += sample[k];
+  for (double& m : mean) m /= static_cast<double>(recent.size());
+  return mean;
+}
 
 Recording describe(const Plate& plate, const PassSettings& pass, const SimulatorSettings& settings,
                    std::uint64_t seed) {
@@ -336,10 +329,10 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
   // Timing faults have a stream of their own for each pass, so that a loss in one pass does not move
   // another's.
   const RandomStream timing(seed, stream_named("time") + finger.noise_stream());
-  MovingAverage filter(static_cast<int>(std::lround(settings.filter_s * settings.rate_hz)));
-
+  const auto length =
+      static_cast<std::size_t>(std::max(1L, std::lround(settings.filter_s * settings.rate_hz)));
+  std::deque<std::vector<double>> recent;
   BodyResponse response(settings.body, settings.array);
-
   Recording recording = describe(plate, pass, settings, seed);
   for (std::size_t i = 0; i < frames; ++i) {
     const double stamp = static_cast<double>(i) / settings.rate_hz;
@@ -355,7 +348,7 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
       response(1 / settings.rate_hz, volts);
       for (double& v : volts) v = recording.signal_scale.rest - recording.signal_scale.span * v;
     }
-    volts = filter(volts);
+    volts = averaged(volts, length, recent);
     if (timing.uniform(2 * i + 1) < settings.lost_fraction) continue;
     const FingerPose pose = pose_at(stamp, pass);
     recording.time_s.push_back(stamp);

@@ -1,8 +1,8 @@
-#include "data/windows/signal_remarks.h"
-
+// Faults of a data set that no single file shows.
 #include <algorithm>
 
 #include "data/windows/split.h"
+#include "data/windows/windows.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"

@@ -9,7 +9,7 @@
 
 #include "data/recordings/resample.h"
 #include "data/windows/random_passes.h"
-#include "data/windows/signal_remarks.h"
+#include "data/windows/windows.h"
 #include "io/numbers/numbers.h"
 #include "layers/checkpoint.h"
 #include "models/inference/compiled/ranges.h"

@@ -1,4 +1,4 @@
-#include "data/windows/signal_remarks.h"
+#include "data/windows/windows.h"
 
 #include "data/simulation/simulator.h"
 #include "tests/data/test_recordings.h"
