@@ -113,8 +113,7 @@ TextLayout text_layout_of(std::uint64_t seed) {
     if (star && !several && !by_rows) {
       unsigned crossed = 0;
       for (const char c : text.substr(text[0] == '$' ? 1 : 0)) crossed ^= static_cast<unsigned char>(c);
-      constexpr char kHex[] = "0123456789ABCDEF";
-      text += std::string("*") + kHex[crossed >> 4] + kHex[crossed & 15];
+      text += "*" + hex_of_bytes({static_cast<char>(crossed)});
     }
     if (stamp == 5 && !several && !by_rows) text = clock_of_day(84000.5 + 0.02 * n) + " -> " + text;
     text += "\r\n";
@@ -222,12 +221,11 @@ TextLayout third_layout_of(std::uint64_t seed) {
       now.push_back(std::round(10 * (rest[k] + (pressed ? 9 : 0) + draw.normal())) / 10);
       if (form > 0) now[k] = std::round(now[k]);
       const int whole = static_cast<int>(now[k]);
-      constexpr char kHex[] = "0123456789ABCDEF";
       if (form == 1)
         text += std::to_string(k / columns) + "," + std::to_string(k % columns) + "," +
                 std::to_string(whole) + "\r\n";
       else if (form == 2)
-        text += std::string(k > 0 ? " " : "") + kHex[whole >> 4 & 15] + kHex[whole & 15];
+        text += (k > 0 ? " " : "") + hex_of_bytes({static_cast<char>(whole)});
       else
         text += (k > 0 ? between : "") + (form == 0 ? format(now[k], 1) + unit : std::to_string(whole));
     }
@@ -278,7 +276,6 @@ TextLayout fourth_layout_of(std::uint64_t seed) {
       if (form == 5) v = std::clamp(v / 4, 0.0, 255.0);
       now.push_back(form == 3 || form == 11 ? std::round(10 * v) / 10 : std::round(v));
       const std::string plain = format(now[k], 0), mark = text.empty() ? "" : between;
-      constexpr char kHex[] = "0123456789ABCDEF";
       const int whole = static_cast<int>(now[k]);
       if (form == 3)
         text += mark + comma(format(now[k], 1));
@@ -287,7 +284,7 @@ TextLayout fourth_layout_of(std::uint64_t seed) {
                                                plain.substr(plain.size() - 3)
                                          : plain);
       else if (form == 5)
-        text += std::string(" ") + kHex[whole >> 4 & 15] + kHex[whole & 15];
+        text += " " + hex_of_bytes({static_cast<char>(whole)});
       else if (form == 6)
         text += "<s i=\"" + std::to_string(k) + "\">" + plain + "</s>";
       else if (form == 7)
