@@ -20,10 +20,6 @@ file(GLOB_RECURSE own_flags ${PROJECT_SOURCE_DIR}/autograd/kernels/fast/*.cpp)
 set_source_files_properties(${own_flags} TARGET_DIRECTORY supertac_autograd supertac_autograd_f64
   PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
 
-# It has types of the anonymous namespace in a class of a header.
-set_source_files_properties(${PROJECT_SOURCE_DIR}/models/inference/compiled/integer_plan.cpp TARGET_DIRECTORY supertac_compiled
-  PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
-
 # A library (-fPIC) and a program (-fPIE) cannot share a header, nor can files with OpenMP and without, nor examples, which
 # have none of our options.
 function(supertac_precompile target)

@@ -10,10 +10,9 @@ namespace supertac {
 
 // kernels.c, compiled for this machine. What is constant in a microcontroller's program is the thread's here.
 namespace c99 {
-namespace {
 
-thread_local std::uint8_t* work = nullptr;
-thread_local float number_step = 1;
+static thread_local std::uint8_t* work = nullptr;
+static thread_local float number_step = 1;
 
 #define WORK work
 #define NUMBER_STEP number_step
@@ -21,7 +20,6 @@ thread_local float number_step = 1;
 #undef WORK
 #undef NUMBER_STEP
 
-}  // namespace
 }  // namespace c99
 
 struct IntegerPlan::Compiled {
