@@ -1,4 +1,4 @@
-// backward(): the chain rule. Behind it stands where reverse steps find the gradients that they add to.
+// backward() is the chain rule; below it slot_of() finds the gradient that a reverse step adds to.
 #include <algorithm>
 #include <memory>
 #include <string>

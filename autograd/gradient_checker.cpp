@@ -68,6 +68,16 @@ double nearest_derivative(const Function& f, Variable& leaf, Dim index, double s
   return nearest;
 }
 
+// Of the entries whose numeric gradient is not about 0, which has no ratio.
+double ratio_of_wrong(const std::vector<GradientEntry>& entries) {
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  for (const GradientEntry& e : entries) {
+    if (e.relative_error <= kGradientTolerance || std::abs(e.numeric) < 1e-6) continue;
+    least = std::min(least, e.analytic / e.numeric), most = std::max(most, e.analytic / e.numeric);
+  }
+  return most - least < 1e-3 ? (most + least) / 2 : std::numeric_limits<double>::quiet_NaN();
+}
+
 // "name [3,0,7] of [4,2,9]"
 std::string place_of(const GradientEntry& e, const Shape& shape, const std::vector<std::string>& names) {
   std::array<Dim, kMaxRank> at{};
@@ -84,8 +94,11 @@ std::string place_of(const GradientEntry& e, const Shape& shape, const std::vect
 std::string GradientReport::text() const {
   std::ostringstream out;
   out.precision(10);
-  if (entries > 0)
-    out << wrong << " of " << entries << " entries off by more than " << kGradientTolerance << '\n';
+  if (entries == 0) return "no entries: the inputs are empty\n";
+  out << wrong << " of " << entries << " entries (of " << elements << " elements) off by more than "
+      << kGradientTolerance;
+  if (std::isfinite(ratio)) out << ", analytic = " << std::round(1e3 * ratio) / 1e3 << " numeric in each";
+  out << '\n';
   for (const GradientEntry& e : worst)
     out << e.place << ": analytic " << e.analytic << ", numeric " << e.numeric << ", relative error "
         << e.relative_error << (e.relative_error > kGradientTolerance ? "" : " (right)") << '\n';
@@ -103,6 +116,7 @@ GradientReport check_gradients(const Function& f, std::vector<Variable> inputs,
   std::vector<double> largest(inputs.size());
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     const Dim size = inputs[k].size(), count = std::min(size, options.max_entries_per_input);
+    report.elements += size;
     const Tensor& grad = inputs[k].grad();
     for (Dim i = 0; i < count; ++i) {
       const Dim index = i * size / count;
@@ -123,6 +137,7 @@ GradientReport check_gradients(const Function& f, std::vector<Variable> inputs,
     report.wrong += e.relative_error > kGradientTolerance;
     e.place = place_of(e, inputs[e.input].shape(), options.names);
   }
+  report.ratio = ratio_of_wrong(report.worst);
   std::sort(report.worst.begin(), report.worst.end(), [](const GradientEntry& a, const GradientEntry& b) {
     return a.relative_error > b.relative_error;
   });

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -25,14 +26,18 @@ struct GradientEntry {
   std::string place;
 };
 
-/// Of empty inputs nothing is compared: entries and max_relative_error are 0.
+/// Of empty inputs nothing is compared: entries and max_relative_error are 0, and text() says so.
 struct GradientReport {
   std::vector<GradientEntry> worst;  // the largest errors first, at most ten
   double max_relative_error = 0;
-  Dim entries = 0;
-  Dim wrong = 0;  // entries beyond kGradientTolerance
+  Dim entries = 0;   // that were compared
+  Dim elements = 0;  // of all inputs, from which they are taken evenly
+  Dim wrong = 0;     // entries beyond kGradientTolerance
+  /// Analytic through numeric where it is the same for all wrong entries, to a thousandth: -1 is a sign, 2 a
+  /// factor, 0 a missing term; NaN where they differ.
+  double ratio = std::numeric_limits<double>::quiet_NaN();
   /// How many are wrong, and one line per entry of `worst`, for a failing test to print:
-  /// "1 of 72 entries off by more than 1e-06"
+  /// "1 of 72 entries (of 4608 elements) off by more than 1e-06, analytic = -1 numeric in each"
   /// "encoder.2.conv.1.weight [3,0,7] of [4,2,9]: analytic 0.25, numeric 0.5, relative error 0.5"
   /// An entry of `worst` that is right ends in " (right)".
   std::string text() const;

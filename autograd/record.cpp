@@ -1,5 +1,6 @@
 // How ops become part of the graph, and how they refuse arguments.
 #include <algorithm>
+#include <sstream>
 #include <stdexcept>
 
 #include "autograd/trace.h"
@@ -39,6 +40,13 @@ NoGrad::~NoGrad() { recording = before_; }
 void refuse(const std::string& op, const std::string& argument, const std::string& expected,
             const std::string& got) {
   throw std::invalid_argument(op + ": " + argument + " expects " + expected + ", got " + got);
+}
+
+std::string digits(double number) {
+  std::ostringstream out;
+  out.precision(9);
+  out << number;
+  return out.str();
 }
 
 void check_defined(const char* op, const char* argument, const Variable& x) {

@@ -73,7 +73,7 @@ Variable::Variable(Tensor value, bool requires_grad, std::unique_ptr<Node> node)
 }
 
 Node& Variable::checked() const {
-  if (node_ == nullptr) refuse("Variable", "what is used", "a value", "an empty Variable");
+  if (node_ == nullptr) refuse("Variable", "the one that is used", "a value, from a tensor or an op", "none");
   return *node_;
 }
 

@@ -12,6 +12,7 @@
 #include "autograd/ops/losses.h"
 #include "autograd/ops/shaping.h"
 #include "autograd/ops/vae.h"
+#include "autograd/record.h"
 #include "layers/residual.h"
 #include "models/networks/classifier.h"
 #include "models/training/loss/loss.h"
@@ -41,12 +42,14 @@ class Cases {
  public:
   explicit Cases(std::string kind) : kind_(std::move(kind)) {}
 
+  // `settings`: of the op, for the names of what is wrong: "conv2d weight (stride 2, padding 1)".
   void op(const std::string& name, const std::vector<std::string>& inputs, const std::vector<Tensor>& values,
-          const F& f, GradientCheckOptions options = {}) {
+          const F& f, GradientCheckOptions options = {}, const std::string& settings = {}) {
     Leaves leaves;
     for (const Tensor& t : values) leaves.emplace_back(t, true);
     options.names = inputs;
-    for (std::string& input : options.names) input = name + " " + input;
+    for (std::string& input : options.names)
+      input = name + " " + input + (settings.empty() ? "" : " (" + settings + ")");
     cases_.push_back({kind_, name, [f, leaves] { return f(leaves); }, leaves, std::move(options), f});
   }
 
@@ -110,13 +113,19 @@ void attention(Cases& cases) {
              [](const Leaves& in) { return gated_sum(in[0], in[1], in[2]); });
 }
 
+std::string activation_text(real negative_slope) {
+  return negative_slope == kNoActivation ? "no activation" : "negative_slope " + digits(negative_slope);
+}
+
 using Convolve = Variable (*)(const Variable&, const Variable&, const Variable&, const ConvOptions&);
 
 void convolution(Cases& cases, const std::string& name, Convolve op, const Shape& x, const Shape& w,
                  const ConvOptions& options, Dim most = 60) {
-  cases.op(name, {"x", "weight", "bias"}, {uniform(x, 1), uniform(w, 2), uniform({w[w.rank() - 1]}, 3)},
-           [=](const Leaves& in) { return op(in[0], in[1], in[2], options); },
-           {.max_entries_per_input = most});
+  cases.op(
+      name, {"x", "weight", "bias"}, {uniform(x, 1), uniform(w, 2), uniform({w[w.rank() - 1]}, 3)},
+      [=](const Leaves& in) { return op(in[0], in[1], in[2], options); }, {.max_entries_per_input = most},
+      "stride " + std::to_string(options.stride) + ", padding " + std::to_string(options.padding) + ", " +
+          activation_text(options.negative_slope));
 }
 
 // H != W, strides 2 and 3, no padding and much, a single pixel, channels around the lengths of vectors.
@@ -156,9 +165,11 @@ void convolutions(Cases& cases) {
   } matrices[] = {{1, 1, 1}, {2, 3, 17}, {1, 33, 3}, {19, 17, 33}, {2, 40, 512}};
   for (const auto& m : matrices)
     for (const real negative_slope : {kNoActivation, kRelu, kLeakyRelu})
-      cases.op("linear", {"x", "weight", "bias"},
-               {uniform({m.rows, m.in}, 1), uniform({m.in, m.out}, 2), uniform({m.out}, 3)},
-               [=](const Leaves& in) { return linear(in[0], in[1], in[2], negative_slope); });
+      cases.op(
+          "linear", {"x", "weight", "bias"},
+          {uniform({m.rows, m.in}, 1), uniform({m.in, m.out}, 2), uniform({m.out}, 3)},
+          [=](const Leaves& in) { return linear(in[0], in[1], in[2], negative_slope); }, {},
+          activation_text(negative_slope));
 }
 
 void shaping(Cases& cases) {

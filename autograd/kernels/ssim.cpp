@@ -63,26 +63,23 @@ class SsimImage {
   void add_gradient(const real* x, const real* target, real g, real* gx) {
     take_moments(x, target);
     const real each = g / static_cast<real>(oh_ * ow_);
-    real *by_x = map(7), *by_square = map(8), *by_product = map(9);
     for (Dim i = 0; i < oh_ * ow_; ++i) {
       const Terms t = terms_at(i);
       const real s = t.value();
       const real by_mean = 2 * (t.mean_b * t.n2 / (t.d1 * t.d2) - t.mean_a * s / t.d1);
       const real by_var = t.var_a > 0 ? -s / t.d2 : 0;
       const real by_cov = 2 * t.n1 / (t.d1 * t.d2);
-      by_x[i] = each * (by_mean - 2 * mean_a_[i] * by_var - mean_b_[i] * by_cov);
-      by_square[i] = each * 2 * by_var;
-      by_product[i] = each * by_cov;
+      by_x_[i] = each * (by_mean - 2 * mean_a_[i] * by_var - mean_b_[i] * by_cov);
+      by_square_[i] = each * 2 * by_var;
+      by_product_[i] = each * by_cov;
     }
-    add_transposed_blur(by_x, nullptr, gx);
-    add_transposed_blur(by_square, a_, gx);
-    add_transposed_blur(by_product, b_, gx);
+    add_transposed_blur(by_x_, nullptr, gx);
+    add_transposed_blur(by_square_, a_, gx);
+    add_transposed_blur(by_product_, b_, gx);
   }
 
  private:
-  // 0 to 6: images and moments (below); 7 to 9: what add_gradient() makes, 8 the product in blur_product();
-  // 10: a blur along one axis.
-  static constexpr Dim kMaps = 11;
+  static constexpr Dim kMaps = 12;  // those at the end of the class
   real* map(Dim i) { return store_.data() + i * h_ * wd_; }
 
   // Wang et al. 2004, eq. 13, at one position of the window: n1 n2 / (d1 d2).
@@ -124,26 +121,23 @@ class SsimImage {
 
   // to [oh,ow] = blur(a b), a, b [h,w]
   void blur_product(const real* a, const real* b, real* to) {
-    real* product = map(8);
-    for (Dim i = 0; i < h_ * wd_; ++i) product[i] = a[i] * b[i];
-    blur(product, to);
+    for (Dim i = 0; i < h_ * wd_; ++i) product_[i] = a[i] * b[i];
+    blur(product_, to);
   }
 
   // [h, w] -> [oh, ow]: columns first, then rows
   void blur(const real* from, real* to) {
-    real* columns = map(10);
-    std::fill_n(columns, oh_ * wd_, real(0));
-    add_windows(wd_, from, {wd_, wd_}, nullptr, columns, {wd_, 0});
+    std::fill_n(columns_, oh_ * wd_, real(0));
+    add_windows(wd_, from, {wd_, wd_}, nullptr, columns_, {wd_, 0});
     std::fill_n(to, oh_ * ow_, real(0));
-    add_windows(ow_, columns, {wd_, 1}, nullptr, to, {ow_, 0});
+    add_windows(ow_, columns_, {wd_, 1}, nullptr, to, {ow_, 0});
   }
 
   // gx += factor * blur^T(from), factor per pixel (null: 1)
   void add_transposed_blur(const real* from, const real* factor, real* gx) {
-    real* columns = map(10);
-    std::fill_n(columns, oh_ * wd_, real(0));
-    add_windows(ow_, from, {ow_, 0}, nullptr, columns, {wd_, 1});
-    add_windows(wd_, columns, {wd_, 0}, factor, gx, {wd_, wd_});
+    std::fill_n(columns_, oh_ * wd_, real(0));
+    add_windows(ow_, from, {ow_, 0}, nullptr, columns_, {wd_, 1});
+    add_windows(wd_, columns_, {wd_, 0}, factor, gx, {wd_, wd_});
   }
 
   // to[y, k, x] += weight[k] from[y, k, x] factor[y, k, x] for y < oh, the k of the window and x < width,
@@ -173,6 +167,9 @@ class SsimImage {
   real centre_a_ = 0, centre_b_ = 0;
   real *const mean_a_ = map(2), *const mean_b_ = map(3), *const aa_ = map(4), *const bb_ = map(5),
               *const ab_ = map(6);  // [oh,ow]: windowed, of a, b, a a, b b and a b
+  real *const by_x_ = map(7), *const by_square_ = map(8), *const by_product_ = map(9);  // [oh,ow]: gradients
+  real* const product_ = map(10);                                                       // [h,w]
+  real* const columns_ = map(11);  // [oh,w]: blurred along the columns, not yet along the rows
 };
 
 }  // namespace

@@ -22,7 +22,7 @@ Variable leaky_relu(const Variable& x, real negative_slope) {
 }
 
 void check_slope(const char* op, real slope) {
-  if (!(slope >= 0)) refuse(op, "negative_slope", "0 or more", std::to_string(slope));
+  if (!(slope >= 0)) refuse(op, "negative_slope", "0 or more", digits(slope));
 }
 
 // y = f(s) and gy of one shape;  gy becomes gs = gy f'(s) = y > 0 ? gy : slope gy (kernels::Rectifier)
@@ -42,7 +42,7 @@ Variable sigmoid(const Variable& x) {
 
 // y = min(max(x, low), high);  gx = gy within the limits, which belong to it, 0 beyond
 Variable clamp(const Variable& x, real low, real high) {
-  if (!(low <= high)) refuse("clamp", "low", "at most high, " + std::to_string(high), std::to_string(low));
+  if (!(low <= high)) refuse("clamp", "low", "at most high, " + digits(high), digits(low));
   return elementwise(
       "clamp", x, [=](real at) { return at < low ? low : (at > high ? high : at); },
       [=](real gy, real at, real) { return at >= low && at <= high ? gy : 0; }, {.low = low, .high = high});

@@ -28,7 +28,7 @@ Variable ssim(const Variable& x, const Tensor& target) {
   check_rank("ssim", "x", x, 4);
   if (target.shape() != x.shape()) refuse("ssim", "target", x.shape().text(), target.text());
   if (x.dim(0) < 1 || x.dim(3) != 1 || std::min(x.dim(1), x.dim(2)) < 3)
-    refuse("ssim", "x", "[N,H,W,1] with H, W >= 3", x.shape().text());
+    refuse("ssim", "x", "[N,H,W,1] with N >= 1 and H, W >= 3", x.shape().text());
   const Dim images = x.dim(0), height = x.dim(1), width = x.dim(2);
   const double total = kernels::ssim(images, height, width, x.value().data(), target.data());
   const auto value = static_cast<real>(total / static_cast<double>(images));

@@ -89,13 +89,15 @@ Variable concat(std::span<const Variable> xs) {
 static void check_runs(const Variable& x, const Runs& r) {
   check_has_columns("take_runs", "x", x);
   check_no_gradient("take_runs", "x", x);
-  if (r.first < 0 || r.run < 1 || r.step < r.run || r.width < r.run || r.width % r.run != 0)
-    refuse("take_runs", "runs", "first >= 0, run >= 1, step >= run and width a multiple of run",
-           std::to_string(r.first) + ", " + std::to_string(r.run) + ", " + std::to_string(r.step) + " and " +
-               std::to_string(r.width));
-  const Dim end = r.first + (r.width / r.run - 1) * r.step + r.run;
-  if (end > x.dim(x.rank() - 1))
-    refuse("take_runs", "x", std::to_string(end) + " columns or more", x.shape().text());
+  const Dim columns = x.dim(x.rank() - 1);  // no sum or product below is larger than its square
+  check_between("take_runs", "first", r.first, 0, columns);
+  check_between("take_runs", "run", r.run, 1, std::max<Dim>(columns, 1));
+  check_at_least("take_runs", "step", r.step, r.run);
+  check_between("take_runs", "width", r.width, r.run, std::max(columns, r.run));
+  if (r.width % r.run != 0)
+    refuse("take_runs", "width", "a multiple of run, " + std::to_string(r.run), std::to_string(r.width));
+  const Dim end = r.first + (r.width / r.run - 1) * std::min(r.step, columns + 1) + r.run;
+  if (end > columns) refuse("take_runs", "x", std::to_string(end) + " columns or more", x.shape().text());
 }
 
 // x [...,columns] -> y [...,width]: from column `first` on `run` columns, and so on every `step` columns
@@ -116,11 +118,13 @@ Variable take_runs(const Variable& x, const Runs& r) {
 // windows [N,T,rows * columns * channels] -> y [N,rows,columns,channels], the last of T
 Variable last_frame(const Variable& x, Dim rows, Dim columns, Dim channels) {
   check_rank("last_frame", "windows", x, 3);
-  check_at_least("last_frame", "rows", rows, 1);
-  check_at_least("last_frame", "columns", columns, 1);
-  check_at_least("last_frame", "channels", channels, 1);
-  const Dim images = x.dim(0), frames = x.dim(1), signals = rows * columns * channels;
-  check_shape("last_frame", "windows", x, {images, std::max<Dim>(frames, 1), signals});
+  const Dim images = x.dim(0), frames = x.dim(1);
+  if (frames < 1) refuse("last_frame", "windows", "one frame or more", x.shape().text());
+  check_between("last_frame", "rows", rows, 1, x.dim(2));
+  check_between("last_frame", "columns", columns, 1, x.dim(2) / rows);
+  check_between("last_frame", "channels", channels, 1, x.dim(2) / (rows * columns));
+  const Dim signals = rows * columns * channels;
+  check_shape("last_frame", "windows", x, {images, frames, signals});
   check_no_gradient("last_frame", "windows", x);
   Tensor y(Shape{images, rows, columns, channels});
   move_columns(images, signals, x.value().data(), {frames * signals, (frames - 1) * signals},
@@ -142,7 +146,8 @@ Variable unflatten_channels_first(const Variable& x, std::span<const Dim> pixels
   check_rank("unflatten_channels_first", "x", x, 2);
   if (pixels.empty() || pixels.size() > 2)
     refuse("unflatten_channels_first", "pixels", "{L} or {H,W}", std::to_string(pixels.size()) + " sizes");
-  for (const Dim side : pixels) check_at_least("unflatten_channels_first", "pixels", side, 1);
+  constexpr Dim kMostSide = 1 << 30;  // of two, whose product is a number
+  for (const Dim side : pixels) check_between("unflatten_channels_first", "pixels", side, 1, kMostSide);
   const Dim count = pixels.size() == 1 ? pixels[0] : pixels[0] * pixels[1];
   if (x.dim(1) % count != 0)
     refuse("unflatten_channels_first", "x", "a multiple of " + std::to_string(count) + " columns",

@@ -50,7 +50,7 @@ double power(double base, std::int64_t exponent) {
 Adam::Adam(std::vector<Variable> parameters, const AdamOptions& options)
     : parameters_(std::move(parameters)), options_(options) {
   const auto require = [](bool holds, const char* option, const char* expected, double got) {
-    if (!holds) refuse("Adam", option, expected, std::to_string(got));
+    if (!holds) refuse("Adam", option, expected, digits(got));
   };
   const auto in_unit = [](double beta) { return beta >= 0 && beta < 1; };
   require(options.learning_rate >= 0, "learning_rate", "0 or more", options.learning_rate);

@@ -186,7 +186,7 @@ class Trainer {
   void look_for_collapse(StepReport& report);
   /// Throws TrainingStopped: step, `what`, and advice.
   [[noreturn]] void stop(const std::string& what) const;
-  // In training_state.cpp: adds up the gradients and moves the weights.
+  // Adds up the gradients and moves the weights.
   double apply();
   void add_up_over_ranks();
 

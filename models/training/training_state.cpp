@@ -1,53 +1,17 @@
-// What a training has besides its network and data: Adam, the learning rate's schedule, the step and the best
-// epoch; saved and restored to the bit.
+// The state of a training, saved and restored to the bit: parameters, Adam's moments, the step and the best
+// epoch.
 
 #include <algorithm>
-#include <array>
-#include <bit>
-#include <cmath>
 #include <utility>
 
-#include "autograd/kernels/fast/each.h"
 #include "io/numbers/numbers.h"
 #include "layers/checkpoint.h"
-#include "models/training/loss/collapse.h"
 #include "models/training/trainer.h"
 
 namespace supertac {
 namespace {
 
 void copy_into(Tensor& to, const Tensor& from) { std::copy_n(from.data(), from.size(), to.data()); }
-
-constexpr Dim kTreeBlock = 1024;  // so that what the tree adds up on its way stays in the first cache
-
-// The left half of the tree is a whole one: as many parts as the largest power of two below their number.
-void add_block(Dim n, Dim at, std::span<const real* const> parts, real* y) {
-  if (parts.size() == 1) {
-    std::copy_n(parts[0] + at, n, y);
-    return;
-  }
-  if (parts.size() == 8) {  // eight micro-batches: eight streams that are fetched side by side
-    const real *a = parts[0] + at, *b = parts[1] + at, *c = parts[2] + at, *d = parts[3] + at;
-    const real *e = parts[4] + at, *f = parts[5] + at, *g = parts[6] + at, *h = parts[7] + at;
-    return kernels::each(
-        n, [=](Dim i) { y[i] = ((a[i] + b[i]) + (c[i] + d[i])) + ((e[i] + f[i]) + (g[i] + h[i])); });
-  }
-  const std::size_t left = std::bit_ceil(parts.size()) / 2;
-  std::array<real, kTreeBlock> right;
-  add_block(n, at, parts.first(left), y);
-  add_block(n, at, parts.subspan(left), right.data());
-  kernels::each(n, [y, other = right.data()](Dim i) { y[i] += other[i]; });
-}
-
-// y = the sum of all parts (at least one) as a balanced binary tree: neighbours, then pairs of pairs; -0
-// becomes +0.
-void add_as_tree(Dim n, std::span<const real* const> parts, real* y) {
-  for (Dim at = 0; at < n; at += kTreeBlock) {
-    const Dim count = std::min(kTreeBlock, n - at);
-    add_block(count, at, parts, y + at);
-    kernels::each(count, [to = y + at](Dim i) { to[i] += 0; });
-  }
-}
 
 void expect_same(const SafetensorsFile& file, const std::string& path,
                  const std::map<std::string, std::string>& expected) {
@@ -62,51 +26,6 @@ void expect_same(const SafetensorsFile& file, const std::string& path,
 }
 
 }  // namespace
-
-void Trainer::add_up_over_ranks() {
-  sum_.clear();
-  for (const Parameter& p : model().parameters()) {
-    const auto gradient = p.value.grad().values();
-    sum_.insert(sum_.end(), gradient.begin(), gradient.end());
-  }
-  of_partner_sum_.resize(sum_.size());
-  ranks_.add_up(sum_, of_partner_sum_);
-  const real* next = sum_.data();
-  for (const Parameter& p : model().parameters()) {
-    const auto gradient = Variable(p.value).mutable_grad().values();
-    std::copy_n(next, gradient.size(), gradient.data());
-    next += gradient.size();
-  }
-}
-
-// Sets the gradients to the sum of the micro-batches', a balanced binary tree (pairs of neighbours, then
-// pairs of pairs), then over the ranks; applies Adam; counts the step. Returns the gradient's norm before
-// clipping. Throws TrainingStopped when it is not finite; parameters, moments and step are as they were.
-double Trainer::apply() {
-  const std::vector<Parameter>& parameters = model().parameters();
-  const auto& micro_batches = micro_batch_parameters_;
-#pragma omp parallel for schedule(dynamic)
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    std::array<const real*, kMostMicroBatches> parts;
-    for (std::size_t micro_batch = 0; micro_batch < micro_batches.size(); ++micro_batch)
-      parts[micro_batch] = (*micro_batches[micro_batch])[i].value.grad().data();
-    Tensor& sum = Variable(parameters[i].value).mutable_grad();
-    if (parts[0] == nullptr) {  // the loss does not depend on it
-      sum.fill(0);
-    } else {
-      add_as_tree(sum.size(), std::span(parts).first(micro_batches.size()), sum.data());
-    }
-  }
-  if (ranks_.size() > 1) add_up_over_ranks();
-  adam_.set_learning_rate(schedule_.at(step_));
-  const double norm = adam_.step();
-  if (!std::isfinite(norm)) {
-    const std::string name = gradient_not_finite(parameters);
-    stop(name.empty() ? "the gradient's norm overflows" : "the gradient of " + name + " is not finite");
-  }
-  ++step_;
-  return norm;
-}
 
 void Trainer::epoch_scored(double score) {
   ++epochs_since_best_;

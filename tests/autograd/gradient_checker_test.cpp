@@ -53,6 +53,12 @@ TEST(GradientChecker, FailsOnPlantedErrors) {
     EXPECT_GT(report.max_relative_error, 0.1) << e.name;
     ASSERT_FALSE(report.worst.empty());
     EXPECT_EQ(report.worst[0].input, 0U) << e.name << ": the report names the wrong input\n" << report.text();
+    const auto says = [&](const char* pattern) { return report.text().find(pattern) != std::string::npos; };
+    if (sizeof(real) == 8) {
+      EXPECT_EQ(says(", analytic = -1 numeric in each\n"), e.by_one == -1) << report.text();
+      EXPECT_EQ(says(", analytic = 2 numeric in each\n"), e.by_one == 2) << report.text();
+      EXPECT_EQ(says(", analytic = 0 numeric in each\n"), e.by_b == 0) << report.text();
+    }
   }
 }
 
@@ -68,7 +74,9 @@ TEST(GradientChecker, FailsOnOneWrongElement) {
   EXPECT_EQ(report.text().find("input 0 [1,3] of [3,4]: analytic "), report.text().find('\n') + 1)
       << report.text();
   if (sizeof(real) == 8) {
-    EXPECT_TRUE(report.text().starts_with("1 of 12 entries off by more than 1e-06\n")) << report.text();
+    EXPECT_TRUE(report.text().starts_with(
+        "1 of 12 entries (of 12 elements) off by more than 1e-06, analytic = -1 numeric in each\n"))
+        << report.text();
     const std::string text = report.text(), second = text.substr(text.find("input 0 [1,3]"));
     EXPECT_FALSE(second.substr(0, second.find('\n')).ends_with(" (right)")) << text;
     EXPECT_TRUE(text.ends_with(" (right)\n")) << text;
@@ -114,7 +122,7 @@ TEST(GradientChecker, OfEmptyInputsNothingIsCompared) {
   const auto report = checked([](const auto& in) { return 2 * in[0]; }, {Tensor::zeros({0, 3})});
   EXPECT_EQ(report.entries, 0);
   EXPECT_EQ(report.max_relative_error, 0);
-  EXPECT_EQ(report.text(), "");
+  EXPECT_EQ(report.text(), "no entries: the inputs are empty\n");
 }
 
 }  // namespace supertac::gradient_checker_test

@@ -145,7 +145,7 @@ TEST(Variable, RefusesToBeUsedWithoutAValue) {
                                         [&] { empty.drop_grad(); },    [&] { backward(empty); },
                                         [&] { inputs_of(empty); }};
   for (const auto& use : uses)
-    EXPECT_REFUSAL("Variable: what is used expects a value, got an empty Variable", use());
+    EXPECT_REFUSAL("Variable: the one that is used expects a value, from a tensor or an op, got none", use());
   EXPECT_REFUSAL("Variable: value expects a tensor, got an undefined one", parameter(Tensor()));
   EXPECT_STREQ(Variable().op(), "none");
   EXPECT_STREQ(parameter(Tensor::zeros({1})).op(), "leaf");

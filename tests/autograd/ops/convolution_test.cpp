@@ -38,6 +38,7 @@ TEST(Conv, RefusesWithNames) {
                  conv2d(x, zeros({3, 0, 3, 16}), b, {.padding = 1}));
   EXPECT_REFUSAL("conv2d: b expects [16], got [2,3]", conv2d(x, w3, flat, {}));
   EXPECT_REFUSAL("conv2d: stride expects 1 to 4096, got 0", conv2d(x, w3, b, {.stride = 0}));
+  EXPECT_REFUSAL("conv2d: stride expects 1 to 4096, got 4097", conv2d(x, w3, b, {.stride = 4097}));
   EXPECT_REFUSAL("conv2d: padding expects 0 to 4096, got -1", conv2d(x, w3, b, {.padding = -1}));
   EXPECT_REFUSAL("conv2d: padding expects 0 to 4096, got 4097", conv2d(x, w3, b, {.padding = 4097}));
 }

@@ -147,8 +147,9 @@ TEST(Ssim, RefusesOtherShapes) {
   const Variable x(Tensor::zeros({1, 16, 16, 1}));
   EXPECT_REFUSAL("ssim: x expects rank 4, got [16,16]", ssim(zeros({16, 16}), Tensor::zeros({16, 16})));
   EXPECT_REFUSAL("ssim: target expects [1,16,16,1], got [16,16]", ssim(x, Tensor::zeros({16, 16})));
+  EXPECT_REFUSAL("ssim: target expects [1,16,16,1], got none", ssim(x, Tensor()));
   for (const Shape& bad : {Shape{1, 2, 16, 1}, Shape{1, 16, 16, 2}, Shape{0, 16, 16, 1}}) {
-    EXPECT_REFUSAL("ssim: x expects [N,H,W,1] with H, W >= 3, got " + bad.text(),
+    EXPECT_REFUSAL("ssim: x expects [N,H,W,1] with N >= 1 and H, W >= 3, got " + bad.text(),
                    ssim(Variable(Tensor::zeros(bad)), Tensor::zeros(bad)));
   }
 }

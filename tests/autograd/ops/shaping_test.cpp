@@ -47,12 +47,17 @@ TEST(Shaping, TakesRunsOfColumns) {
   const Variable y = take_runs(x, {.first = 1, .run = 2, .step = 3, .width = 4});
   EXPECT_VALUES(y.value(), {2, 4}, {1, 2, 4, 5, 11, 12, 14, 15});
   EXPECT_REFUSAL("take_runs: x expects 7 columns or more, got [2,6]", take_runs(x, {2, 2, 3, 4}));
-  const std::string runs =
-      "take_runs: runs expects first >= 0, run >= 1, step >= run and width a multiple of run, got ";
-  EXPECT_REFUSAL(runs + "-1, 2, 3 and 4", take_runs(x, {-1, 2, 3, 4}));
-  EXPECT_REFUSAL(runs + "0, 0, 3 and 4", take_runs(x, {0, 0, 3, 4}));
-  EXPECT_REFUSAL(runs + "0, 2, 1 and 4", take_runs(x, {0, 2, 1, 4}));
-  EXPECT_REFUSAL(runs + "0, 2, 2 and 3", take_runs(x, {0, 2, 2, 3}));
+  constexpr Dim kHuge = std::numeric_limits<Dim>::max();
+  EXPECT_REFUSAL("take_runs: first expects 0 to 6, got -1", take_runs(x, {-1, 2, 3, 4}));
+  EXPECT_REFUSAL("take_runs: first expects 0 to 6, got " + std::to_string(kHuge),
+                 take_runs(x, {kHuge, 2, 3, 4}));
+  EXPECT_REFUSAL("take_runs: run expects 1 to 6, got 0", take_runs(x, {0, 0, 3, 4}));
+  EXPECT_REFUSAL("take_runs: step expects 2 or more, got 1", take_runs(x, {0, 2, 1, 4}));
+  EXPECT_REFUSAL("take_runs: x expects 9 columns or more, got [2,6]", take_runs(x, {0, 2, kHuge, 4}));
+  EXPECT_REFUSAL("take_runs: width expects 2 to 6, got " + std::to_string(kHuge - 1),
+                 take_runs(x, {0, 2, 2, kHuge - 1}));
+  EXPECT_REFUSAL("take_runs: width expects a multiple of run, 2, got 3", take_runs(x, {0, 2, 2, 3}));
+  EXPECT_REFUSAL("take_runs: x expects a value, got an empty Variable", take_runs(Variable(), {0, 1, 1, 1}));
   EXPECT_REFUSAL("take_runs: x expects rank 1 or more, got []", take_runs(zeros({}), {0, 1, 1, 1}));
   EXPECT_REFUSAL("take_runs: x expects a constant, got a variable that requires a gradient",
                  take_runs(Variable(Tensor::zeros({2, 6}), true), {0, 2, 2, 4}));
@@ -62,10 +67,15 @@ TEST(Shaping, TakesTheLastFrameOfEachWindow) {
   const Variable x(Tensor::of({2, 2, 2}, {0, 1, 2, 3, 10, 11, 12, 13}));
   EXPECT_VALUES(last_frame(x, 1, 2, 1).value(), {2, 1, 2, 1}, {2, 3, 12, 13});
   EXPECT_REFUSAL("last_frame: windows expects rank 3, got [2,4]", last_frame(zeros({2, 4}), 1, 2, 1));
-  EXPECT_REFUSAL("last_frame: windows expects [2,2,6], got [2,2,2]", last_frame(x, 3, 2, 1));
-  EXPECT_REFUSAL("last_frame: rows expects 1 or more, got -1", last_frame(x, -1, -2, 1));
-  EXPECT_REFUSAL("last_frame: columns expects 1 or more, got -2", last_frame(x, 1, -2, 1));
-  EXPECT_REFUSAL("last_frame: channels expects 1 or more, got 0", last_frame(x, 1, 2, 0));
+  EXPECT_REFUSAL("last_frame: windows expects [2,2,1], got [2,2,2]", last_frame(x, 1, 1, 1));
+  EXPECT_REFUSAL("last_frame: windows expects one frame or more, got [2,0,2]",
+                 last_frame(zeros({2, 0, 2}), 1, 2, 1));
+  EXPECT_REFUSAL("last_frame: windows expects a value, got an empty Variable",
+                 last_frame(Variable(), 1, 2, 1));
+  EXPECT_REFUSAL("last_frame: rows expects 1 to 2, got 4294967296",
+                 last_frame(x, Dim{1} << 32, Dim{1} << 32, 1));
+  EXPECT_REFUSAL("last_frame: columns expects 1 to 2, got -2", last_frame(x, 1, -2, 1));
+  EXPECT_REFUSAL("last_frame: channels expects 1 to 1, got 0", last_frame(x, 1, 2, 0));
   EXPECT_REFUSAL("last_frame: windows expects a constant, got a variable that requires a gradient",
                  last_frame(Variable(Tensor::zeros({1, 2, 2}), true), 1, 2, 1));
 }
@@ -82,7 +92,10 @@ TEST(Shaping, RefusesWhatDoesNotFit) {
                  unflattened(x, {1, 1, 1}));
   EXPECT_REFUSAL("unflatten_channels_first: x expects a multiple of 2 columns, got [2,3]",
                  unflattened(x, {2}));
-  EXPECT_REFUSAL("unflatten_channels_first: pixels expects 1 or more, got -3", unflattened(x, {-3, -1}));
+  EXPECT_REFUSAL("unflatten_channels_first: pixels expects 1 to 1073741824, got -3",
+                 unflattened(x, {-3, -1}));
+  EXPECT_REFUSAL("unflatten_channels_first: pixels expects 1 to 1073741824, got 4294967296",
+                 unflattened(x, {Dim{1} << 32, Dim{1} << 32}));
 }
 
 TEST(MaxPool, HandComputedAndAnOddRowIsLeftOut) {
