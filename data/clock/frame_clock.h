@@ -9,6 +9,10 @@
 // whose delay is less than the stamp's unit. What the model cannot tell of a frame is an interval round its
 // date.
 //
+// With a period of 10 ms frames 0 to 4 arrive at 0, 12, 35, 35 and 41 ms: 0, 2, 15, 5 and 1 ms after 10 ms
+// for each number. The envelope stays at 0: frame 2 was late, and none was lost. Were frames 2 to 4, and all
+// that follow, 10 ms later, it would rise by a period: one was lost between frames 1 and 2.
+//
 // The assumptions:
 //   - The period is within `tolerance` of the stated one and steady to 2e-4 over a recording. Where reads
 //     are so late that single losses do not show, either the stated period is right or fewer than one in

@@ -31,7 +31,7 @@ struct Recording {
   std::string plate;                            ///< name as Plate::named takes it
   int trial = 0, pass = 0;                      ///< from 1
   double speed_mm_s = 0;                        ///< as measured, or commanded; 0 when unknown
-  std::string source;                           ///< "simulated", "imported" or "collected"
+  std::string source;                           ///< "simulated", "imported", "collected" or "streamed"
   std::map<std::string, std::string> metadata;  ///< whatever else is worth keeping (filter, time base, ...)
 
   std::size_t frames() const { return time_s.size(); }

@@ -1,4 +1,5 @@
 // How near pictures come to their truths: each picture's scores, and their means over a set of windows.
+// Images are [height][width], row-major. SSIM and PSNR take a range of 1; values beyond it count as they are.
 #pragma once
 
 #include <complex>
@@ -17,9 +18,6 @@
 struct kiss_fft_state;
 
 namespace supertac {
-
-/// Images are [height][width], row-major, data range 1 (0..1). Values outside the range count as they are:
-/// nothing is clipped here.
 
 /// PSNR values are capped here: an error of 60 dB (0.1 % of the range) is what rounding to 8 bits costs, so
 /// two images above it are the same picture. Without a cap identical images have an infinite PSNR, and flat

@@ -52,19 +52,19 @@ std::array<Range, kAtOnce> ranges_of(std::span<const float> window, std::size_t 
 
 }  // namespace
 
-void normalise_window(std::span<float> window, std::size_t taxels) {
-  if (taxels == 0 || window.empty() || window.size() % taxels != 0 ||
-      window.size() / taxels > std::numeric_limits<std::uint16_t>::max())
-    throw std::invalid_argument("normalise_window: a window is [T][" + std::to_string(taxels) +
+void normalise_window(std::span<float> window, std::size_t signals) {
+  if (signals == 0 || window.empty() || window.size() % signals != 0 ||
+      window.size() / signals > std::numeric_limits<std::uint16_t>::max())
+    throw std::invalid_argument("normalise_window: a window is [T][" + std::to_string(signals) +
                                 "], T up to " + std::to_string(std::numeric_limits<std::uint16_t>::max()) +
                                 ", got " + std::to_string(window.size()) + " values");
   float gain = kLeastGain;
-  for (std::size_t first = 0; first < taxels; first += kAtOnce) {
-    const std::size_t count = std::min(kAtOnce, taxels - first);
-    const std::array<Range, kAtOnce> ranges = ranges_of(window, taxels, first, count);
+  for (std::size_t first = 0; first < signals; first += kAtOnce) {
+    const std::size_t count = std::min(kAtOnce, signals - first);
+    const std::array<Range, kAtOnce> ranges = ranges_of(window, signals, first, count);
     for (std::size_t k = 0; k < count; ++k)
       gain = std::max(gain, ranges[k].top - kRestRemoved * ranges[k].rest);
-    for (std::size_t frame = first; frame < window.size(); frame += taxels)
+    for (std::size_t frame = first; frame < window.size(); frame += signals)
       for (std::size_t k = 0; k < count; ++k) window[frame + k] -= kRestRemoved * ranges[k].rest;
   }
   const float factor = 1 / gain;

@@ -22,16 +22,16 @@ constexpr std::size_t kTopRank = 3;     ///< two samples may lie above the top: 
 
 /// Brings a window of scaled signals to its own rest and gain, so that a finger that is pressed harder, or
 /// whose taxels are pressed a little all the time, is seen like any other:
-///   rest_k = the 5th percentile over the window of taxel k,  top_k = its third largest sample
+///   rest_k = the 5th percentile over the window of signal k,  top_k = its third largest sample
 ///   g      = max(kLeastGain, max_k (top_k - kRestRemoved rest_k))
 ///   x[t,k] <- clip((x[t,k] - kRestRemoved rest_k) / g, 0, 1)
 /// The gain leaves room for the rest that stays: a finger that is pressed hard on a flat plate looks like
 /// that, and not like noise at full gain (ghosts on unseen plates: 20 % of the flat pictures with top_k -
 /// rest_k, 7 % so). Percentiles are taken in steps of 1/256. Nothing but the window is used: a live window is
 /// normalised like one of training, and no state has to settle after a start. What is lost is how hard the
-/// finger is pressed. `window`: [T][taxels], values in [0,1]. Throws std::invalid_argument when the window is
-/// empty, no multiple of `taxels`, or of over 65,535 samples.
-void normalise_window(std::span<float> window, std::size_t taxels);
+/// finger is pressed. `window`: [T][signals], values in [0,1]. Throws std::invalid_argument when the window
+/// is empty, no multiple of `signals`, or of over 65,535 samples.
+void normalise_window(std::span<float> window, std::size_t signals);
 
 /// Changes of a training window that imitate what differs between trials: how deep the finger is pressed,
 /// contact, gain, rest level, dead taxels, noise. Each magnitude is off at 0. Magnitudes are in units of the

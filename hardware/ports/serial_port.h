@@ -26,7 +26,8 @@ struct SerialSettings {
 class SerialPort : public Port {
  public:
   /// Opens `path` for this process alone: TIOCEXCL, and flock because root passes TIOCEXCL.
-  /// DTR and RTS are raised where they exist. Nothing that has already arrived is thrown away.
+  /// DTR and RTS are raised where they exist. What arrived before it was opened is thrown away:
+  /// it would be dated as if it came now.
   /// Throws PortNotFound, PortPermission, PortBusy, NotASerialPort, PortUnplugged; PortError where the system
   /// makes another baud rate of the one that was asked for.
   explicit SerialPort(const std::string& path, const SerialSettings& settings = {});

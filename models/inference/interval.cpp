@@ -31,7 +31,7 @@ void PixelInterval::half_widths(std::span<const float> picture, std::int64_t wid
 float PixelInterval::reach(std::span<const float> picture, std::int64_t width, std::size_t pixel,
                            float predicted_error) const {
   return static_cast<float>(shift) * steepest(picture, static_cast<std::size_t>(width), pixel) +
-         static_cast<float>(factor) * at_least(predicted_error);
+         static_cast<float>(factor) * floored(predicted_error);
 }
 
 std::string PixelInterval::text() const {
@@ -78,7 +78,7 @@ void IntervalCoverage::add(std::size_t pass, std::span<const float> picture, std
     Height& counts = passes_.back().heights[height];
     const double error = std::abs(double{picture[i]} - double{truth[i]}),
                  reach = double{judged_.reach(picture, width, i, errors_[i])},
-                 predicted = double{at_least(errors_[i])};
+                 predicted = double{floored(errors_[i])};
     const double ratio = (error - reach) / predicted + judged_.factor;
     const double bin = std::max(0.0, std::ceil(ratio * kBinsPerUnit - 1e-6) - 1);
     if (bin < double{kBins}) ++counts.ratios[static_cast<std::size_t>(bin)];

@@ -16,11 +16,11 @@ namespace supertac {
 
 /// Smaller predicted errors count as this one, 2.5 of the 255 steps of an 8-bit picture.
 inline constexpr float kLeastPredictedError = 0.01F;
-inline float at_least(float predicted_error) { return std::max(predicted_error, kLeastPredictedError); }
+inline float floored(float predicted_error) { return std::max(predicted_error, kLeastPredictedError); }
 
 /// The interval that holds the truth of nine pixels in ten, v +- w. A picture may stand a little beside the
 /// surface, and be wrong besides; a network can predict the latter only:
-///   w = shift max |v' - v| + factor at_least(predicted error), 1 at most,    v': the eight pixels around
+///   w = shift max |v' - v| + factor floored(predicted error), 1 at most,    v': the eight pixels around
 /// the first term being, to first order, what a picture `shift` pixels off changes. A predicted error is the
 /// network's, or where `load` is not 0 that of with_load().
 struct PixelInterval {

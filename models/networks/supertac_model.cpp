@@ -89,6 +89,7 @@ Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
   const RirbOptions rirb{.channels = s.channels, .blocks = s.rcabs};
   rirbs_ = add_each("rirb", doublings, [&](Dim) { return Rirb(rirb, rng); });
   out_.emplace(add("out", Conv2d(s.channels, 1, kSameSize, rng)));
+  // In files the predicted error is called spread, as it was at first.
   if (s.predicted_error) predicted_error_.emplace(add("spread", Conv2d(s.channels, 1, kSameSize, rng)));
   if (s.sees_last_frame())
     last_frame_.emplace(add("last_frame", Conv2d(s.in_channels, s.channels, kSameSize, rng)));
@@ -108,7 +109,7 @@ Variable Upsampler::map_of(const Variable& latents, const Variable& windows) con
 
 Prediction Upsampler::forward(const Variable& latents, const Variable& windows) const {
   Variable h = map_of(latents, windows);                // [N,rows,columns,channels]
-  for (const Rirb& rirb : rirbs_) h = rirb.forward(h);  // twice as high and wide by each
+  for (const Rirb& rirb : rirbs_) h = rirb.forward(h);  // [N,H,W,channels] to [N,2H,2W,channels] by each
   return {out_->forward(h), predicted_error_ ? predicted_error_->forward(h) : Variable(), latents};
 }
 
