@@ -77,7 +77,7 @@ class MarlinLink {
     std::vector<Reply> replies;  ///< the lines before its ok, oldest first
     double sent_s = 0;           ///< before its line was written for the first time
     double answered_s = 0;       ///< when its ok arrived, or another answer that proves that it was taken
-    bool repeated = false;  ///< its line was sent or asked for again: sent_s and answered_s lie far apart
+    bool repeated = false;       ///< its line was sent or asked for again: when it ran is little known
   };
 
   /// `port` must outlive the link.
