@@ -278,7 +278,7 @@ void WindowSet::window(std::size_t i, std::span<float> out) const {
   if (settings_.scaling.per_window) normalise_window(out, array().signals());
 }
 
-std::vector<float> WindowSet::window(std::size_t i) const {
+std::vector<float> WindowSet::raw_window(std::size_t i) const {
   std::vector<float> values(input_size());
   read_samples(i, frames() - 1, values);
   return values;

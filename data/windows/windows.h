@@ -128,7 +128,7 @@ class WindowSet {
   /// Window i as a network takes it, [T][signals], oldest frame first; normalised when the scaling says so.
   void window(std::size_t i, std::span<float> out) const;
   /// The window, not normalised.
-  std::vector<float> window(std::size_t i) const;
+  std::vector<float> raw_window(std::size_t i) const;
   /// Writes the truth [height][width] of image() of the frame that the window shows: of its last frame, or of
   /// an earlier one where pictures are delayed. It is the measured one or truth_image(), and 0 in the air.
   void truth(std::size_t i, std::span<float> out) const;

@@ -33,7 +33,7 @@ double mean_error(const WindowSet& set, const std::vector<std::uint32_t>& indice
   std::vector<float> out(256), truth(256);
   double sum = 0;
   for (const std::uint32_t i : indices) {
-    baseline.predict(set.window(i), out);
+    baseline.predict(set.raw_window(i), out);
     set.truth(i, truth);
     for (std::size_t p = 0; p < 256; ++p) sum += (out[p] - truth[p]) * (out[p] - truth[p]);
   }
@@ -130,7 +130,7 @@ TEST(Baselines, MeanImageIsTheMeanTruthWhateverItSees) {
   const std::vector<std::uint32_t> train{3, 400};
   const MeanImage mean(set, train);
   std::vector<float> out(256), a(256), b(256);
-  mean.predict(set.window(0), out);
+  mean.predict(set.raw_window(0), out);
   set.truth(3, a);
   set.truth(400, b);
   for (std::size_t p = 0; p < 256; ++p) ASSERT_NEAR(out[p], (a[p] + b[p]) / 2, 1e-6);
@@ -139,7 +139,7 @@ TEST(Baselines, MeanImageIsTheMeanTruthWhateverItSees) {
 TEST(Baselines, AllButRidgeSeeTheLastFrameOnly) {
   const WindowSet set = surface_windows(0.2, 0.5);
   const auto baselines = fit_baselines(set, all_of(set));
-  const std::vector<float> window = set.window(200);
+  const std::vector<float> window = set.raw_window(200);
   std::vector<float> out(256), again(256);
   for (const auto& baseline : baselines) {
     baseline->predict(window, out);
@@ -172,7 +172,7 @@ TEST(Baselines, NeedWindowsToFitTo) {
                    baseline->predict(std::vector<float>(15), out));
     EXPECT_REFUSAL(ridge ? "ridge: expects a window [16][16] and 256 pixels, got 256 and 64 values"
                          : "baseline: the image expects 256 values, got 64",
-                   baseline->predict(set.window(0), small));
+                   baseline->predict(set.raw_window(0), small));
   }
 }
 
@@ -210,9 +210,10 @@ TEST(Ridge, IsLinearInTheWindow) {
   const Ridge ridge(set, train);
   EXPECT_DOUBLE_EQ(ridge.penalty(), 1e-5) << "nothing to guard against without noise";
   std::vector<float> a(256), b(256), middle(256), window(16 * rig::kTaxels);
-  ridge.predict(set.window(10), a);
-  ridge.predict(set.window(500), b);
-  for (std::size_t i = 0; i < window.size(); ++i) window[i] = (set.window(10)[i] + set.window(500)[i]) / 2;
+  ridge.predict(set.raw_window(10), a);
+  ridge.predict(set.raw_window(500), b);
+  for (std::size_t i = 0; i < window.size(); ++i)
+    window[i] = (set.raw_window(10)[i] + set.raw_window(500)[i]) / 2;
   ridge.predict(window, middle);
   for (std::size_t p = 0; p < 256; ++p) ASSERT_NEAR(middle[p], (a[p] + b[p]) / 2, 1e-4);
 }
@@ -246,7 +247,7 @@ TEST(Ridge, LeavesNoMeanError) {
   std::vector<float> out(256), truth(256);
   std::vector<double> sum(256);
   for (const std::uint32_t i : train) {
-    ridge.predict(set.window(i), out);
+    ridge.predict(set.raw_window(i), out);
     set.truth(i, truth);
     for (std::size_t p = 0; p < 256; ++p) sum[p] += out[p] - truth[p];
   }
@@ -263,7 +264,7 @@ TEST(Ridge, DoesNotDependOnTheNumberOfThreads) {
     const Ridge ridge(set, train);
     std::vector<float> out(256);
     for (std::size_t i = 0; i < set.size(); ++i) {
-      ridge.predict(set.window(i), out);
+      ridge.predict(set.raw_window(i), out);
       pictures[threads - 1].insert(pictures[threads - 1].end(), out.begin(), out.end());
     }
   }

@@ -33,7 +33,7 @@ TEST(Units, CountsThatRiseGiveTheWindowsOfVoltsThatFall) {
   ASSERT_EQ(sets[0].size(), sets[1].size());
   float worst = 0, most = 0;
   for (std::size_t i = 0; i < sets[0].size(); ++i) {
-    const std::vector<float> a = sets[0].window(i), b = sets[1].window(i);
+    const std::vector<float> a = sets[0].raw_window(i), b = sets[1].raw_window(i);
     for (std::size_t k = 0; k < a.size(); ++k)
       worst = std::max(worst, std::abs(a[k] - b[k])), most = std::max(most, a[k]);
   }
@@ -71,7 +71,7 @@ TEST(Units, RandomPassesSpeakTheSensorsLanguage) {
   ASSERT_GT(windows.size(), before);
   float most = 0;
   for (std::size_t i = before; i < windows.size(); i += 10)
-    for (const float value : windows.window(i)) most = std::max(most, value);
+    for (const float value : windows.raw_window(i)) most = std::max(most, value);
   EXPECT_GT(most, 0.2F);
   EXPECT_LT(most, 1.0F);
 }

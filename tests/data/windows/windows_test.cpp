@@ -41,7 +41,7 @@ TEST(Windows, ShowWhereTheFingerWasTheirDelayAgo) {
   std::vector<float> a(256), b(256);
   for (std::size_t i = kFrames; i < now.size(); ++i) {
     if (i >= 85 && i < 85 + kFrames) continue;  // of the pass before
-    EXPECT_EQ(later.window(i), now.window(i));
+    EXPECT_EQ(later.raw_window(i), now.raw_window(i));
     EXPECT_EQ(later.position(i).y_mm, now.position(i - kFrames).y_mm);
     EXPECT_EQ(later.shown_frame(i), now.shown_frame(i - kFrames));
     now.truth(i - kFrames, a), later.truth(i, b);
@@ -49,8 +49,8 @@ TEST(Windows, ShowWhereTheFingerWasTheirDelayAgo) {
   }
   EXPECT_NE(later.fingerprint(), now.fingerprint());
   const std::uint32_t shown[] = {10, 20}, shown_later[] = {10 + kFrames, 20 + kFrames};
-  UpsampledFrame(now, shown).predict(now.window(30), a);
-  UpsampledFrame(later, shown_later).predict(later.window(30 + kFrames), b);
+  UpsampledFrame(now, shown).predict(now.raw_window(30), a);
+  UpsampledFrame(later, shown_later).predict(later.raw_window(30 + kFrames), b);
   EXPECT_EQ(a, b) << "bicubic interpolation of the frame that is shown";
 }
 
@@ -60,7 +60,7 @@ TEST(Windows, NeverCrossTheEdgeOfAPass) {
   set.add(make_recording({.pass = 2, .frames = 40, .level = 1.2F}));
   ASSERT_EQ(set.size(), 50U);
   for (std::size_t i = 0; i < set.size(); ++i) {
-    const auto window = set.window(i);
+    const auto window = set.raw_window(i);
     const bool first = set.pass_of(i) == 0;
     for (const float v : window)
       ASSERT_EQ(v < 0.7F, first) << i;  // (3 - 2) / 2 = .5 against (3 - 1.2) / 2 = .9
@@ -154,7 +154,7 @@ TEST(Windows, OfAnyArray) {
   set.add(recording);
   EXPECT_EQ(set.array(), settings.array);
   EXPECT_EQ(set.image(), (ImageGrid{24, 24, 0.5}));
-  EXPECT_EQ(set.window(0).size(), 32U * 36);
+  EXPECT_EQ(set.raw_window(0).size(), 32U * 36);
   EXPECT_EQ(set.shown_frame(5).size(), 36U);
   std::vector<float> truth(576), expected(576);
   for (std::size_t i = 0; i < set.size(); i += 97) {
@@ -166,7 +166,7 @@ TEST(Windows, OfAnyArray) {
   std::vector<std::uint32_t> train;
   for (std::uint32_t i = 0; i < set.size(); i += 9) train.push_back(i);
   for (const auto& baseline : fit_baselines(set, train)) {
-    baseline->predict(set.window(0), truth);
+    baseline->predict(set.raw_window(0), truth);
     EXPECT_TRUE(std::isfinite(truth[575])) << baseline->name();
   }
 }
@@ -304,7 +304,7 @@ TEST(Windows, OfOneFrameAreTheRecordedFrames) {
   ASSERT_EQ(set.size(), 100U);
   std::vector<float> truth(96);
   for (std::size_t i = 0; i < 100; ++i) {
-    EXPECT_EQ(set.window(i)[0], set.settings().scaling(recording.signals[6 * i]));
+    EXPECT_EQ(set.raw_window(i)[0], set.settings().scaling(recording.signals[6 * i]));
     set.truth(i, truth);
     EXPECT_EQ(truth[0], recording.truth[96 * i]);
   }

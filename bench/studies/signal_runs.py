@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Sends a signal at a random moment of every phase of every program that touches a port.
 
-    bench/studies/rig/signal_runs.py BUILD [RUNS [FIRST_SEED]] > bench/results/rig/signals.csv
+    bench/studies/signal_runs.py BUILD [RUNS [FIRST_SEED]] > bench/results/rig/signals.csv
 
 Each program must end within 2 s with 128 + signal; in contact it may take longer, and must say that the finger was
 lifted. A second signal outside contact must end it within 0.2 s. Programs that end by themselves, and collections that
@@ -24,7 +24,7 @@ import threading
 import time
 import tty
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 from source import source  # noqa: E402
 
 SPEEDUP = 4
