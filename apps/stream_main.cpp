@@ -51,7 +51,7 @@ std::unique_ptr<SensorSource> open_source(const Arguments& a, double speedup) {
   return open_sensor(board, speedup, capture);
 }
 
-/// A pseudo-terminal has a rig behind it that is none.
+/// What the pictures come from; a board at a pseudo-terminal is a virtual rig.
 std::string badge_of(const Arguments& a) {
   for (const char* name : {"replay", "recording", "sensor"})
     if (a.given(name)) return name;

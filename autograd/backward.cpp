@@ -43,8 +43,8 @@ class Queue {
 
 void check_not_freed(const Node& node) {
   if (node.freed)
-    refuse("backward", node.op, "its graph",
-           "one that an earlier backward freed; run the forward pass again");
+    refuse("backward", "loss", "a graph that is whole",
+           std::string("one whose op ") + node.op + " an earlier backward freed; run the forward pass again");
 }
 
 void check_gradient(const Node& x) {
@@ -78,8 +78,7 @@ void backward(const Variable& loss) {
   Node& last = *loss.node();
   check_not_freed(last);
   if (!last.requires_grad)
-    refuse("backward", "loss", "to depend on a variable that requires a gradient",
-           "one that depends on none");
+    refuse("backward", "loss", "a variable that depends on one with a gradient", "one that depends on none");
   if (!last.grad.defined()) last.grad = Tensor::zeros(loss.shape());
   check_gradient(last);
   last.grad.data()[0] += 1;                // dL/dL

@@ -1,4 +1,4 @@
-// What stands behind a Variable: the nodes of the graph. Whoever walks the graph itself needs it: ops do not.
+// What stands behind a Variable: the nodes of the graph. Ops see them through Backward (record.h) alone.
 #pragma once
 
 #include <array>

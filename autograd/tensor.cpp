@@ -66,7 +66,7 @@ Tensor Tensor::clone() const {
 void Tensor::fill(real value) { std::ranges::fill(values(), value); }
 
 real Tensor::item() const {
-  if (size() != 1) refuse("item", "the tensor", "one element", text());
+  if (size() != 1) refuse("Tensor::item", "this", "one element", text());
   return *values_;
 }
 

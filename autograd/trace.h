@@ -42,7 +42,7 @@ class Trace {
 
   const std::vector<TracedOp>& ops() const { return ops_; }
 
-  /// Called by record() when `y` was computed.
+  /// Called by make_result() when `y` was computed.
   static void note(const char* op, const Variable& y, std::span<const Variable* const> inputs,
                    const OpSettings* settings);
 

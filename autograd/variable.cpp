@@ -73,7 +73,7 @@ Variable::Variable(Tensor value, bool requires_grad, std::unique_ptr<Node> node)
 }
 
 Node& Variable::checked() const {
-  if (node_ == nullptr) refuse("Variable", "the one that is used", "a value, from a tensor or an op", "none");
+  if (node_ == nullptr) refuse("Variable", "its value", "a tensor or an op's result", "an empty Variable");
   return *node_;
 }
 

@@ -15,7 +15,7 @@ namespace supertac {
 class Rng {
  public:
   explicit Rng(std::uint64_t seed) : stream_(seed, 0) {}
-  /// For layers whose values come from a file: uniform_fan_in() makes zeros, in no time.
+  /// For layers whose values come from a file: uniform_fan_in() then makes zeros and draws nothing.
   static Rng zeros() {
     Rng rng(0);
     rng.zeros_ = true;

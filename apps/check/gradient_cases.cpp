@@ -47,10 +47,13 @@ class Cases {
           const F& f, GradientCheckOptions options = {}, const std::string& settings = {}) {
     Leaves leaves;
     for (const Tensor& t : values) leaves.emplace_back(t, true);
+    std::vector<bool> is_weight;
+    for (const std::string& input : inputs) is_weight.push_back(input == "weight" || input == "bias");
     options.names = inputs;
     for (std::string& input : options.names)
       input = name + " " + input + (settings.empty() ? "" : " (" + settings + ")");
-    cases_.push_back({kind_, name, [f, leaves] { return f(leaves); }, leaves, std::move(options), f});
+    cases_.push_back(
+        {kind_, name, [f, leaves] { return f(leaves); }, leaves, std::move(options), f, is_weight});
   }
 
   // The parameters asked for, and x where it has a gradient.
@@ -67,7 +70,7 @@ class Cases {
     const Variable input = x ? Variable(*x, true) : Variable();
     if (x) leaves.push_back(input), options.names.push_back("x");
     for (std::string& leaf : options.names) leaf = name + " " + leaf;
-    cases_.push_back({kind_, name, [=] { return f(*m, input); }, leaves, std::move(options), {}});
+    cases_.push_back({kind_, name, [=] { return f(*m, input); }, leaves, std::move(options), {}, {}});
   }
 
   template <class M>

@@ -17,6 +17,7 @@ struct GradientCase {
   std::vector<Variable> leaves;
   GradientCheckOptions options{};
   std::function<Variable(const std::vector<Variable>&)> of{};  ///< of an op: f of any leaves
+  std::vector<bool> is_weight{};  ///< of an op, for each leaf: its size does not follow the number of rows
 };
 
 /// All of them, and those of ops alone. Cases of one name follow each other.

@@ -6,7 +6,7 @@
 namespace supertac {
 
 /// Convolutions and linear layers apply f(s) = s for s > 0, else negative_slope * s, as they store their
-/// result, which saves a pass over memory forward, and backward a map.
+/// result: forward this saves a pass over memory, backward it saves keeping s.
 inline constexpr real kNoActivation = 1, kRelu = 0, kLeakyRelu = real(0.01);
 
 /// y = max(x, 0). At 0 the gradient is 0.

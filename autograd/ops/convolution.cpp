@@ -42,7 +42,7 @@ ConvSettings settings_of(const Variable& x, const Variable& w, const ConvOptions
 
 // Both conv and transposed conv: only the geometry differs.
 //   x [N,H,W,in], w [taps...,in,out], b [out], y [N,H',W',out]; in one dimension without H
-//   gs = gy f'(y)     gx = transpose(conv)(gs)     gw[t] = sum over pixels x^T gs     gb = sum over pixels gs
+//   gs = gy f'(s)     gx = transpose(conv)(gs)     gw[t] = sum over pixels x^T gs     gb = sum over pixels gs
 Variable convolve(const char* op, const Variable& x, const Variable& w, const Variable& b,
                   const ConvOptions& o, int rank, bool transposed) {
   check_arguments(op, x, w, b, o, rank);

@@ -23,7 +23,7 @@ void check_slope(const char* op, real negative_slope);
 /// returns it.
 const real* before_activation(Backward& g, real negative_slope);
 
-/// y[i] = value(x[i]);   gx[i] += gradient(gy[i], x[i], y[i])
+/// y[i] = value(x[i]);   gx[i] = or += gradient(gy[i], x[i], y[i])
 /// `gradient` is copied into the node. Both call nothing that the C library rounds (kernels/exp.h), and
 /// capture numbers alone: a captured tensor would be kept for as long as the graph.
 template <class Value, class Gradient>

@@ -5,8 +5,8 @@
 
 namespace supertac {
 
-// x [N,in], w [in,out], b [out], y [N,out] = f(x w + b)
-// gs = gy f'(y)     gx = gs w^T     gw = x^T gs     gb = sum over rows gs
+// x [N,in], w [in,out], b [out], s [N,out] = x w + b, y = f(s)
+// gs = gy f'(s)     gx = gs w^T     gw = x^T gs     gb = sum over rows gs
 Variable linear(const Variable& x, const Variable& w, const Variable& b, real negative_slope) {
   check_rank("linear", "x", x, 2);
   check_rank("linear", "w", w, 2);

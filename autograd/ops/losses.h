@@ -12,7 +12,8 @@ namespace supertac {
 /// mean of (x - target)^2 over all elements; x, target [...] of one shape, both may require gradients.
 Variable l2_loss(const Variable& x, const Variable& target);
 
-/// Mean structural similarity (Wang et al. 2004, eq. 13) of windows of x and target [N,H,W,1], H, W >= 3,
+/// Mean structural similarity (Wang et al. 2004, eq. 13) of x and target [N,H,W,1], H, W >= 3, in a sliding
+/// window,
 ///
 ///     (2 mx mt + C1) (2 cov + C2) / ((mx^2 + mt^2 + C1) (vx + vt + C2)),   m means, v variances
 ///

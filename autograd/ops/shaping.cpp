@@ -60,8 +60,8 @@ Variable concat(std::span<const Variable> xs) {
   Dim width = 0;
   for (std::size_t i = 0; i < xs.size(); ++i) {
     const std::string name = "x" + std::to_string(i);
-    check_defined("concat", name.c_str(), xs[i]);
-    const Dim last = xs[i].rank() < 1 ? 0 : xs[i].dim(xs[i].rank() - 1);
+    check_rank("concat", name.c_str(), xs[i], xs[0].rank());
+    const Dim last = xs[i].dim(xs[i].rank() - 1);
     check_shape("concat", name.c_str(), xs[i], with_last(xs[0].shape(), last));
     inputs[i] = &xs[i];
     width += last;
@@ -103,11 +103,11 @@ static void check_runs(const Variable& x, const Runs& r) {
 // x [...,columns] -> y [...,width]: from column `first` on `run` columns, and so on every `step` columns
 Variable take_runs(const Variable& x, const Runs& r) {
   check_runs(x, r);
-  const Dim width = x.dim(x.rank() - 1);
+  const Dim columns = x.dim(x.rank() - 1);
   Tensor y(with_last(x.shape(), r.width));
-  const Dim rows = x.size() / width;
+  const Dim rows = x.size() / columns;
   for (Dim at = 0; at < r.width; at += r.run) {
-    move_columns(rows, r.run, x.value().data(), {width, r.first + at / r.run * r.step},
+    move_columns(rows, r.run, x.value().data(), {columns, r.first + at / r.run * r.step},
                  {y.data(), Into::overwrite}, {r.width, at});
   }
   const OpSettings settings{.first = r.first, .run = r.run, .step = r.step};
@@ -115,7 +115,7 @@ Variable take_runs(const Variable& x, const Runs& r) {
       "take_runs", y, {&x}, [](Backward&) {}, &settings);
 }
 
-// windows [N,T,rows * columns * channels] -> y [N,rows,columns,channels], the last of T
+// x [N,T,rows * columns * channels] -> y [N,rows,columns,channels], the last of T
 Variable last_frame(const Variable& x, Dim rows, Dim columns, Dim channels) {
   check_rank("last_frame", "windows", x, 3);
   const Dim images = x.dim(0), frames = x.dim(1);

@@ -1,5 +1,6 @@
 // Adam (Kingma & Ba 2015, algorithm 1) with bias correction and clipping of the gradient norm; and Muon
-// (Jordan et al. 2024) for matrices of weights, as an option. And the learning rate over a training.
+// (Jordan et al. 2024) for matrices of weights, as an option. Schedule gives the learning rate over a
+// training.
 #pragma once
 
 #include <cstdint>

@@ -98,7 +98,7 @@ class FrameClock {
   Rate rate_;
   double measured_s_;
   DeviceStamps stamps_;
-  std::deque<ReadEnd> window_;  // the newest bursts
+  std::deque<ReadEnd> window_;  // the newest bursts: frames that came in one read, or waited for one
   std::deque<Low> lows_;        // of window_: rising levels, the lowest in front
   std::vector<ReadEnd> ends_;   // bursts that have left it, for the rate
   std::uint64_t closed_ = 0, ended_ = 0, lost_ = 0, damaged_ = 0, resets_ = 0;

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "data/frames/board_frame.h"
+#include "data/frames/binary_decoder.h"
 #include "data/frames/text_grammar.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"

@@ -19,23 +19,25 @@ bool finite(std::span<const float> signals) {
   return std::all_of(signals.begin(), signals.end(), [](float v) { return std::isfinite(v); });
 }
 
-std::span<const float> volts_of(const Recording& recording, std::size_t frame) {
+std::span<const float> signals_of(const Recording& recording, std::size_t frame) {
   const std::size_t signals = recording.array.signals();
   return std::span(recording.signals).subspan(frame * signals, signals);
 }
 
 void check(const Recording& recording, const ResampleSettings& settings) {
+  const auto require = [](bool holds, const char* argument, const char* expected, double found) {
+    if (!holds) throw std::invalid_argument(refusal("resample", argument, expected, format(found)));
+  };
   const double span = settings.scaling.value_or(Scaling{}).span;
-  if (!(settings.rate_hz > 0) || !(settings.max_gap_s > 0) || !(std::abs(span) > 0))
-    throw std::invalid_argument("resample: rate_hz and max_gap_s must be positive, span not 0, got " +
-                                std::to_string(settings.rate_hz) + ", " + std::to_string(settings.max_gap_s) +
-                                " and " + std::to_string(span));
+  require(settings.rate_hz > 0, "rate_hz", "more than 0", settings.rate_hz);
+  require(settings.max_gap_s > 0, "max_gap_s", "more than 0", settings.max_gap_s);
+  require(std::abs(span) > 0, "scaling.span", "a number other than 0", span);
   const std::size_t n = recording.time_s.size(), values = n * recording.array.signals();
   const std::size_t positions = recording.position_mm.size(), lifts = recording.lift_mm.size();
   if (recording.signals.size() != values || (positions != 0 && positions != 2 * n) ||
       (lifts != 0 && lifts != n))
     throw std::runtime_error("recording: " + std::to_string(n) + " time stamps need " +
-                             std::to_string(values) + " voltages, 0 or " + std::to_string(2 * n) +
+                             std::to_string(values) + " signals, 0 or " + std::to_string(2 * n) +
                              " coordinates and 0 or " + std::to_string(n) + " lifts, got " +
                              std::to_string(recording.signals.size()) + ", " + std::to_string(positions) +
                              " and " + std::to_string(lifts) + "; record or import the pass again");
@@ -79,7 +81,7 @@ class Segment {
     Resampler resampler(signals, settings_.rate_hz, settings_.scaling);
     for (std::size_t i = 0; i < usable_.size(); ++i) {
       const std::size_t had = resampler.samples();
-      resampler.add(time(i), volts_of(recording_, usable_[i]),
+      resampler.add(time(i), signals_of(recording_, usable_[i]),
                     [&](std::size_t j, std::span<const float> sample) {
                       std::ranges::copy(
                           sample, track.samples.begin() + static_cast<std::ptrdiff_t>(begin + j * signals));
@@ -154,7 +156,7 @@ Track resample(const Recording& recording, const ResampleSettings& settings) {
   Track track;
   std::vector<std::size_t> usable;
   for (std::size_t i = 0; i < recording.time_s.size(); ++i) {
-    if (finite(volts_of(recording, i)))
+    if (finite(signals_of(recording, i)))
       usable.push_back(i);
     else
       ++track.damaged;

@@ -95,7 +95,7 @@ struct Track {
       run;                  ///< [frames]: frames since the pass began or since the last gap, itself included
   std::size_t held = 0;     ///< frames for which no sample arrived: they repeat the one before
   std::size_t gaps = 0;     ///< places where the recording is interrupted for longer than max_gap_s
-  std::size_t damaged = 0;  ///< recorded frames with a voltage that is not finite: taken as lost
+  std::size_t damaged = 0;  ///< recorded frames with a signal that is not finite: taken as lost
   std::size_t frames() const { return run.size(); }
 };
 
@@ -113,7 +113,7 @@ struct ResampleSettings {
 
 /// Puts a recording onto rate_hz, each run between two gaps by a Resampler; samples without a frame are
 /// counted in `held`. position[j] is the position at the time that sample j stands for, linear between
-/// recorded frames. Causal but for half a period (1.7 ms at 300 Hz). A recording made at rate_hz comes out as
+/// recorded frames. Causal but for half a period (5 ms at 100 Hz). A recording made at rate_hz comes out as
 /// it is.
 /// Throws std::invalid_argument on settings that are not positive, std::runtime_error when the sizes of the
 /// recording's arrays disagree or its time stamps do not increase.

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "data/windows/split.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -73,10 +74,8 @@ void MeanImage::predict(std::span<const float> input, std::span<float> out) cons
 }
 
 Bicubic::Bicubic(int rows, int columns, int scale) {
-  if (rows < 1 || columns < 1 || scale < 1)
-    throw std::invalid_argument("bicubic: rows, columns and scale must be at least 1, got " +
-                                std::to_string(rows) + ", " + std::to_string(columns) + " and " +
-                                std::to_string(scale));
+  for (const auto& [name, size] : {std::pair("rows", rows), {"columns", columns}, {"scale", scale}})
+    if (size < 1) throw std::invalid_argument(refusal("bicubic", name, "1 or more", std::to_string(size)));
   rows_ = static_cast<std::size_t>(rows);
   columns_ = static_cast<std::size_t>(columns);
   down_ = weights_of(rows, scale);

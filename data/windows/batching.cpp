@@ -8,6 +8,7 @@
 
 #include "io/numbers/hash.h"
 #include "io/numbers/random.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 
@@ -43,7 +44,7 @@ std::uint64_t EpochOrder::operator[](std::uint64_t i) const {
 Batching::Batching(std::vector<std::uint32_t> indices, std::size_t batch, std::uint64_t seed)
     : indices_(std::move(indices)), batch_(batch), seed_(seed) {
   if (indices_.empty()) throw std::invalid_argument("batching: there is no window to train on");
-  if (batch < 1) throw std::invalid_argument("batching: the batch size must be at least 1, got 0");
+  if (batch < 1) throw std::invalid_argument(refusal("batching", "batch", "1 or more", "0"));
   batch_ = std::min(batch_, indices_.size());
 }
 

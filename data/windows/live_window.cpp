@@ -6,19 +6,23 @@
 #include <string>
 
 #include "data/windows/transforms.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
 
 LiveWindowSettings checked(LiveWindowSettings s) {
-  const auto fail = [](const std::string& what) { throw std::invalid_argument("live window: " + what); };
-  if (s.signals < 1) fail("a frame must have at least 1 signal");
-  if (s.timesteps < 1) fail("timesteps must be at least 1, got " + std::to_string(s.timesteps));
-  if (!(s.rate_hz > 0) || !(s.frame_period_s > 0) || !(s.max_gap_s > 0) || !(std::abs(s.scaling.span) > 0))
-    fail("rate_hz, frame_period_s and max_gap_s must be positive, span not 0, got " +
-         std::to_string(s.rate_hz) + ", " + std::to_string(s.frame_period_s) + ", " +
-         std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span));
-  if (!(s.filter_s >= 0)) fail("filter_s must not be negative, got " + std::to_string(s.filter_s));
+  const auto require = [](bool holds, const char* argument, const char* expected, double found) {
+    if (!holds) throw std::invalid_argument(refusal("live window", argument, expected, format(found)));
+  };
+  require(s.signals >= 1, "signals", "1 or more", static_cast<double>(s.signals));
+  require(s.timesteps >= 1, "timesteps", "1 or more", static_cast<double>(s.timesteps));
+  require(s.rate_hz > 0, "rate_hz", "more than 0", s.rate_hz);
+  require(s.frame_period_s > 0, "frame_period_s", "more than 0", s.frame_period_s);
+  require(s.max_gap_s > 0, "max_gap_s", "more than 0", s.max_gap_s);
+  require(std::abs(s.scaling.span) > 0, "scaling.span", "a number other than 0", s.scaling.span);
+  require(s.filter_s >= 0, "filter_s", "0 or more", s.filter_s);
   s.max_gap_s = std::max(s.max_gap_s, kGapPeriods * s.frame_period_s);
   return s;
 }

@@ -35,7 +35,7 @@ class LiveWindow {
   struct Counters {
     std::size_t frames = 0;   ///< taken
     std::size_t gaps = 0;     ///< silences, or steps back, longer than max_gap_s: all starts anew
-    std::size_t damaged = 0;  ///< a voltage or the time is not finite: taken as lost
+    std::size_t damaged = 0;  ///< a signal or the time is not finite: taken as lost
     std::size_t late = 0;     ///< not later than the frame before: left out
   };
 

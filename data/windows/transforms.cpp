@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "io/numbers/hash.h"
+#include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -20,7 +22,7 @@ struct Range {
   float rest, top;
 };
 
-// Lower edges of the bins that hold the two percentiles of one taxel.
+// Lower edges of the bins that hold the two percentiles of one signal.
 Range range_of(std::span<const std::uint16_t, kBins> counts, std::size_t frames) {
   const std::size_t below = frames / kRestShare, above = std::min(kTopRank, frames);
   std::size_t rest = 0, top = kBins - 1;
@@ -33,12 +35,12 @@ Range range_of(std::span<const std::uint16_t, kBins> counts, std::size_t frames)
 
 constexpr std::size_t kAtOnce = 16;
 
-// NaN counts as 0. Of `count` taxels from `first` on. Counting costs a tenth of sorting; taking turns lets
+// Of `count` signals from `first` on, NaN counting as 0. Counting costs a tenth of sorting; taking turns lets
 // one count be written while the next is read.
-std::array<Range, kAtOnce> ranges_of(std::span<const float> window, std::size_t taxels, std::size_t first,
+std::array<Range, kAtOnce> ranges_of(std::span<const float> window, std::size_t signals, std::size_t first,
                                      std::size_t count) {
   std::array<std::uint16_t, kAtOnce * kBins> counts{};
-  for (std::size_t frame = first; frame < window.size(); frame += taxels) {
+  for (std::size_t frame = first; frame < window.size(); frame += signals) {
     std::array<std::int32_t, kAtOnce> bins;
     for (std::size_t k = 0; k < count; ++k)
       bins[k] = static_cast<std::int32_t>(std::min(std::max(0.0F, window[frame + k]) * kBins, kBins - 1.0F));
@@ -46,7 +48,7 @@ std::array<Range, kAtOnce> ranges_of(std::span<const float> window, std::size_t 
   }
   std::array<Range, kAtOnce> ranges;
   for (std::size_t k = 0; k < count; ++k)
-    ranges[k] = range_of(std::span(counts).subspan(k * kBins).first<kBins>(), window.size() / taxels);
+    ranges[k] = range_of(std::span(counts).subspan(k * kBins).first<kBins>(), window.size() / signals);
   return ranges;
 }
 
@@ -112,8 +114,7 @@ void choose_dropped(int at_most, const TaxelArray& array, const RandomStream& ra
 void check(const AugmentSettings& settings, const TaxelArray& array) {
   const auto check_one = [](const char* name, double value) {
     if (!(value >= 0) || !std::isfinite(value))
-      throw std::invalid_argument(std::string("augmentation: ") + name +
-                                  " must be 0 (off) or positive, got " + std::to_string(value));
+      throw std::invalid_argument(refusal("augmentation", name, "0 (off) or more", format(value)));
   };
   check_one("lift", settings.lift);
   check_one("gain", settings.gain);
@@ -121,8 +122,8 @@ void check(const AugmentSettings& settings, const TaxelArray& array) {
   check_one("offset", settings.offset);
   check_one("noise", settings.noise);
   if (settings.dropped < 0 || settings.dropped > array.taxels())
-    throw std::invalid_argument("augmentation: dropped must be 0 to " + std::to_string(array.taxels()) +
-                                " taxels, got " + std::to_string(settings.dropped));
+    throw std::invalid_argument(refusal("augmentation", "dropped", "0 to " + std::to_string(array.taxels()),
+                                        std::to_string(settings.dropped)));
 }
 
 void augment(const AugmentSettings& settings, std::uint64_t seed, std::uint64_t sample,

@@ -20,17 +20,18 @@ namespace supertac {
 namespace {
 
 void check(const WindowSettings& s) {
-  const auto fail = [](const std::string& what) { throw std::invalid_argument("windows: " + what); };
+  const auto require = [](bool holds, const char* argument, const char* expected, double found) {
+    if (!holds) throw std::invalid_argument(refusal("windows", argument, expected, format(found)));
+  };
   s.array.value_or(TaxelArray{}).check();
-  if (s.timesteps < 1) fail("timesteps must be at least 1, got " + std::to_string(s.timesteps));
-  if (s.scale != 2 && s.scale != 4 && s.scale != 8 && s.scale != 16)
-    fail("scale must be 2, 4, 8 or 16, got " + std::to_string(s.scale));
-  if (s.stride < 1) fail("stride must be at least 1, got " + std::to_string(s.stride));
-  if (!(s.rate_hz > 0) || !(s.max_gap_s > 0) || !(std::abs(s.scaling.span) > 0))
-    fail("rate_hz and max_gap_s must be positive, span not 0, got " + std::to_string(s.rate_hz) + ", " +
-         std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span));
-  if (!(s.delay_s >= 0 && std::lround(s.delay_s * s.rate_hz) < s.timesteps))
-    fail("what is shown must lie in the window, got a delay of " + format(s.delay_s) + " s");
+  require(s.timesteps >= 1, "timesteps", "1 or more", s.timesteps);
+  require(s.scale == 2 || s.scale == 4 || s.scale == 8 || s.scale == 16, "scale", "2, 4, 8 or 16", s.scale);
+  require(s.stride >= 1, "stride", "1 or more", s.stride);
+  require(s.rate_hz > 0, "rate_hz", "more than 0", s.rate_hz);
+  require(s.max_gap_s > 0, "max_gap_s", "more than 0", s.max_gap_s);
+  require(std::abs(s.scaling.span) > 0, "scaling.span", "a number other than 0", s.scaling.span);
+  require(s.delay_s >= 0 && std::lround(s.delay_s * s.rate_hz) < s.timesteps, "delay_s",
+          "0 to less than the window lasts", s.delay_s);
 }
 
 // Each frame gets the place and the truth of an earlier one. Of the first few there is none; they end no

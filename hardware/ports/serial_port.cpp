@@ -99,7 +99,7 @@ SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
     close(descriptor_);
     throw PortError("port " + path + ": expected " + std::to_string(settings.baud) +
                     " baud, its adapter makes " + std::to_string(found) +
-                    " of it; choose a rate that it has, in the printer's firmware and here");
+                    " of it; choose a rate that it has, in the device and here");
   }
   raise_modem_lines(descriptor_);
   // What waited until somebody opened the port is old, and would be dated as if it came now.

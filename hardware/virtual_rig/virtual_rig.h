@@ -16,7 +16,7 @@
 #include <thread>
 #include <vector>
 
-#include "data/frames/board_frame.h"
+#include "data/frames/binary_decoder.h"
 
 namespace supertac {
 

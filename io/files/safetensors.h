@@ -27,7 +27,7 @@ struct TensorInfo {
 class SafetensorsFile {
  public:
   /// Throws FileError when the file cannot be read or breaks a rule. Rules: the header has at most 1 MiB,
-  /// starts with '{' and is padded with spaces only; at most 4,096 tensors and as many metadata fields;
+  /// starts with '{' and is padded with spaces only; at most 8,192 tensors and 4,096 metadata fields;
   /// nothing nested deeper, no key twice, no field unknown; integers without sign, fraction or overflow; each
   /// tensor's bytes are those of its shape and type; tensors follow each other without gap or overlap up to
   /// the end of the file; version and checksum are right where there are any, and a file with one of them has

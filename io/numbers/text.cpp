@@ -10,6 +10,13 @@ std::string printable(std::string_view text, std::size_t longest) {
   return text.size() > longest ? result + "..." : result;
 }
 
+std::string refusal(std::string_view of, std::string_view argument, std::string_view expected,
+                    std::string_view got) {
+  std::string text(of);
+  text.append(": ").append(argument).append(" expects ").append(expected).append(", got ").append(got);
+  return text;
+}
+
 std::string in_quotes(std::string_view text) { return "'" + printable(text) + "'"; }
 
 std::string left_aligned(std::string_view text, std::size_t width) {

@@ -17,6 +17,11 @@ std::string printable(std::string_view text, std::size_t longest = 60);
 /// printable() in single quotes.
 std::string in_quotes(std::string_view text);
 
+/// "of: argument expects EXPECTED, got GOT", the form in which an argument is refused; ops do by refuse()
+/// (autograd/record.h).
+std::string refusal(std::string_view of, std::string_view argument, std::string_view expected,
+                    std::string_view got);
+
 /// Of ASCII; what is no capital letter stays.
 constexpr char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 

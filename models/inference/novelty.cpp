@@ -8,6 +8,7 @@
 #include <string>
 
 #include "io/numbers/same_bits.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -101,10 +102,11 @@ void signal_features(std::span<const float> window, const TaxelArray& array, std
   const std::size_t signals = array.signals(), rows = static_cast<std::size_t>(array.rows);
   const std::size_t all = window.size() / signals, expected = signal_feature_count(array, all);
   if (window.size() % signals != 0 || (all != 1 && all < kLeastFrames) || out.size() != expected)
-    throw std::invalid_argument("signal features: expects " + std::to_string(kLeastFrames) +
-                                " or more frames of " + std::to_string(signals) + " and room for " +
-                                std::to_string(expected) + ", got " + std::to_string(window.size()) +
-                                " and " + std::to_string(out.size()));
+    throw std::invalid_argument(
+        refusal("signal features", "window",
+                "1 frame or " + std::to_string(kLeastFrames) + " or more of " + std::to_string(signals) +
+                    " signals, and out room for " + std::to_string(expected),
+                std::to_string(window.size()) + " signals and room for " + std::to_string(out.size())));
   if (all == 1) {
     std::ranges::copy(window, out.begin());
     return;

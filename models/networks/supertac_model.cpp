@@ -79,7 +79,7 @@ SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
   if (name == "tiny")
     return {.preset = "tiny", .timesteps = 128, .channels = 8, .rcabs = 1, .predicted_error = true};
   if (name == "frame") return {.preset = name, .timesteps = 1, .predicted_error = true};
-  throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, tiny, frame");
+  refuse(kSettings, "preset", "paper, tiny or frame", "\"" + name + "\"");
 }
 
 Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
@@ -124,6 +124,7 @@ SuperTac::SuperTac(const SuperTacSettings& settings, Rng& rng)
 // The signals of a group are its taxels in order, each with its channels.
 PerGroup<Variable> SuperTac::split(const Variable& windows) const {
   const SuperTacSettings& s = settings_;
+  check_defined("SuperTac", "windows", windows);
   if (windows.rank() != 3 || windows.dim(1) != s.timesteps || windows.dim(2) != s.signals()) {
     refuse("SuperTac", "windows",
            "[N," + std::to_string(s.timesteps) + "," + std::to_string(s.signals()) + "]",

@@ -94,9 +94,9 @@ class PerGroup {
   std::size_t size_;
 };
 
-/// Latents of the G groups [N,G LD], and where settings.sees_last_frame() the last frame of the windows ->
-/// picture and predicted error [N,rows scale,columns scale,1], linear outputs. A linear layer makes a map
-/// [N,rows,columns,channels] of the latents, a convolution one of the frame; of both the sum.
+/// Makes picture and predicted error [N,rows scale,columns scale,1], linear outputs, of the latents of the G
+/// groups [N,G LD] and, where settings.sees_last_frame(), of the windows' last frame. A linear layer makes a
+/// map [N,rows,columns,channels] of the latents, a convolution one of the frame; of both the sum.
 class Upsampler : public Module {
  public:
   Upsampler(const SuperTacSettings& settings, Rng& rng);

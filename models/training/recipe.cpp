@@ -13,8 +13,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-void require(bool holds, const std::string& what, double found) {
-  if (!holds) throw std::invalid_argument("recipe: expected " + what + ", got " + format(found));
+void require(bool holds, const char* argument, const char* expected, double found) {
+  if (!holds) throw std::invalid_argument(refusal("recipe", argument, expected, format(found)));
 }
 
 void read_training(JsonObject entry, Recipe& r) {
@@ -40,18 +40,19 @@ void read_training(JsonObject entry, Recipe& r) {
 }  // namespace
 
 void Recipe::check() const {
-  require(epochs >= 1 && epochs <= 100'000, "epochs from 1 to 100000", static_cast<double>(epochs));
-  require(batch >= 1 && batch <= 4096, "batch from 1 to 4096", static_cast<double>(batch));
-  require(learning_rate > 0 && learning_rate <= 1, "learning_rate above 0 and at most 1", learning_rate);
-  require(warm_up >= 0 && warm_up < 1, "warm_up as a share of all steps, 0 to below 1", warm_up);
-  require(clip_norm >= 0 && std::isfinite(clip_norm), "clip_norm of 0 (never) or more", clip_norm);
+  require(epochs >= 1 && epochs <= 100'000, "epochs", "1 to 100000", static_cast<double>(epochs));
+  require(batch >= 1 && batch <= 4096, "batch", "1 to 4096", static_cast<double>(batch));
+  require(learning_rate > 0 && learning_rate <= 1, "learning_rate", "more than 0 and at most 1",
+          learning_rate);
+  require(warm_up >= 0 && warm_up < 1, "warm_up", "a share of all steps, 0 to below 1", warm_up);
+  require(clip_norm >= 0 && std::isfinite(clip_norm), "clip_norm", "0 (never) or more", clip_norm);
   model.check();
   loss.check();
-  require(rate_hz >= 20 && rate_hz <= 2000, "rate_hz from 20 to 2000", rate_hz);
-  require(delay_s >= 0 && delay_s * rate_hz < static_cast<double>(model.timesteps) - 0.5,
-          "a delay from 0 to less than the window", delay_s);
-  require(stride >= 1 && stride <= 100'000, "stride from 1 to 100000", static_cast<double>(stride));
-  require(random_plates >= 0 && random_plates <= 50'000, "random_plates from 0 to 50000",
+  require(rate_hz >= 20 && rate_hz <= 2000, "rate_hz", "20 to 2000", rate_hz);
+  require(delay_s >= 0 && delay_s * rate_hz < static_cast<double>(model.timesteps) - 0.5, "delay_s",
+          "0 to less than the window lasts", delay_s);
+  require(stride >= 1 && stride <= 100'000, "stride", "1 to 100000", static_cast<double>(stride));
+  require(random_plates >= 0 && random_plates <= 50'000, "random_plates", "0 to 50000",
           static_cast<double>(random_plates));
   const PixelInterval interval = interval_factor.value_or(PixelInterval{});
   if (!PixelInterval::read(interval.text()))
@@ -59,7 +60,7 @@ void Recipe::check() const {
         "recipe: expected interval_factor X,Y,Z with X from 0 to 10, Y from 0.05 to 100 and Z from 0 to "
         "4096, got " +
         interval.text());
-  if (range) require(std::abs(range->span) > 1e-6, "a span that is not 0", range->span);
+  if (range) require(std::abs(range->span) > 1e-6, "range", "a span that is not 0", range->span);
   if (per_window && model.timesteps == 1)
     throw std::invalid_argument(
         "recipe: single frames (--timesteps 1) say nothing of their own rest and gain; give --scaling fixed, "

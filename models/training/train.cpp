@@ -85,7 +85,7 @@ WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std:
 constexpr std::size_t kTestedPerEpoch = 2000;
 constexpr std::int64_t kStepsPerLine = 50;
 
-// Of the windows in contact among some of these.
+// Scores an even sample of `windows`; those in contact count.
 Metrics scores_of(const Trainer& trainer, const std::vector<std::uint32_t>& windows,
                   const std::function<bool()>& stop) {
   return score(Ensemble({CompiledModel(trainer.model())}), trainer.windows(),

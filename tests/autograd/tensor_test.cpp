@@ -74,7 +74,7 @@ TEST(Tensor, EmptyAndUndefinedAreHarmless) {
 
 TEST(Tensor, RefusesWrongCounts) {
   EXPECT_REFUSAL("Tensor::of: values expects 4 numbers for [2,2], got 3", Tensor::of({2, 2}, {1, 2, 3}));
-  EXPECT_REFUSAL("item: the tensor expects one element, got [2]", Tensor::zeros({2}).item());
+  EXPECT_REFUSAL("Tensor::item: this expects one element, got [2]", Tensor::zeros({2}).item());
   EXPECT_EQ(Tensor::full({1, 1}, 7).item(), 7);
 }
 

@@ -82,10 +82,12 @@ TEST(Backward, FreesTheGraph) {
   backward(loss);
   EXPECT_FALSE(middle.grad().defined());
   EXPECT_REFUSAL(
-      "backward: sum expects its graph, got one that an earlier backward freed; run the forward pass again",
+      "backward: loss expects a graph that is whole, got one whose op sum an earlier backward freed; run the "
+      "forward pass again",
       backward(loss));
   EXPECT_REFUSAL(
-      "backward: scale expects its graph, got one that an earlier backward freed; run the forward pass again",
+      "backward: loss expects a graph that is whole, got one whose op scale an earlier backward freed; run "
+      "the forward pass again",
       backward(sum(middle)));
   const Variable fresh = 3 * x;
   backward(sum(fresh));  // a refused backward leaves nothing in the queue
@@ -105,7 +107,7 @@ TEST(Backward, RefusesWhatHasNoGradient) {
   const Variable x = parameter(Tensor::full({2}, 3));
   EXPECT_REFUSAL("backward: loss expects one element, got [2]", backward(1 * x));
   EXPECT_REFUSAL(
-      "backward: loss expects to depend on a variable that requires a gradient, got one that depends on none",
+      "backward: loss expects a variable that depends on one with a gradient, got one that depends on none",
       backward(sum(Variable(Tensor::full({2}, 3)))));
 }
 
@@ -145,7 +147,7 @@ TEST(Variable, RefusesToBeUsedWithoutAValue) {
                                         [&] { empty.drop_grad(); },    [&] { backward(empty); },
                                         [&] { inputs_of(empty); }};
   for (const auto& use : uses)
-    EXPECT_REFUSAL("Variable: the one that is used expects a value, from a tensor or an op, got none", use());
+    EXPECT_REFUSAL("Variable: its value expects a tensor or an op's result, got an empty Variable", use());
   EXPECT_REFUSAL("Variable: value expects a tensor, got an undefined one", parameter(Tensor()));
   EXPECT_STREQ(Variable().op(), "none");
   EXPECT_STREQ(parameter(Tensor::zeros({1})).op(), "leaf");

@@ -93,7 +93,7 @@ double largest_eigenvalue(const WindowSet& windows) {
   std::vector<double> rows, mean(entries), v(entries, 1);
   for (std::size_t i = 0; i < windows.size(); ++i) {
     for (std::size_t e = 0; e < entries; ++e) {
-      rows.push_back(static_cast<double>(windows.window(i)[e / 4 * rig::kTaxels + 12 + e % 4]));
+      rows.push_back(static_cast<double>(windows.raw_window(i)[e / 4 * rig::kTaxels + 12 + e % 4]));
       mean[e] += rows.back() / n;
     }
   }

@@ -145,7 +145,7 @@ TEST(Failures, F11DamagedFramesAreDroppedAndConstantLargeAndDeadSignalsTrainToFi
   });
   EXPECT_EQ(small.windows.counts().damaged, 2U);
   for (std::size_t i = 0; i < small.windows.size(); ++i)
-    for (const float x : small.windows.window(i)) ASSERT_TRUE(x >= 0 && x <= 1);
+    for (const float x : small.windows.raw_window(i)) ASSERT_TRUE(x >= 0 && x <= 1);
   Trainer trainer = small.trainer();
   for (int i = 0; i < 10; ++i) EXPECT_TRUE(std::isfinite(trainer.train_step().total));
 }

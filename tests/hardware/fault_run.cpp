@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "data/frames/board_frame.h"
+#include "data/frames/binary_decoder.h"
 #include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
 #include "io/numbers/numbers.h"

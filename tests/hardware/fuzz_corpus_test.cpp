@@ -1,6 +1,6 @@
 // The fuzzers' corpora as regression tests, in every build: what must hold for the frame decoder and the
 // Marlin link on any bytes. The journal's and the STL reader's are headers, for they have other users.
-#include "data/frames/board_frame.h"
+#include "data/frames/binary_decoder.h"
 #include "hardware/printers/printer.h"
 #include "tests/fuzz/corpus.h"
 #include "tests/fuzz/journal_properties.h"

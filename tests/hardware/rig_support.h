@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/frames/board_frame.h"
+#include "data/frames/binary_decoder.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/printers/printer.h"
 #include "io/numbers/random.h"

@@ -25,7 +25,7 @@ constexpr Dim kPart = 4;
 constexpr Dim filled_up(Dim n) { return (n + kPart - 1) / kPart * kPart; }
 
 Dim sums_of(const ConvSizes& s) { return s.conv.taps() * s.cout; }
-// Of a map with its margin.
+// The lines of a map with its margin, and the pixels of one.
 Dim lines_of(const ConvSizes& s) { return s.conv.height + s.conv.kernel_h - 1; }
 Dim line_of(const ConvSizes& s) { return s.conv.width + kAcross - 1; }
 

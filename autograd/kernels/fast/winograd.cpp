@@ -39,7 +39,7 @@ Tensor turned(Dim cin, Dim cout, const real* w) {
   return out;
 }
 
-// Of maps of so many channels.
+// The job for tiles first .. first + count of maps of so many channels.
 TileJob tiles(const ConvSizes& s, Dim channels, Dim first, Dim count) {
   const ConvSettings& c = s.conv;
   return {.tiles_down = c.height / kSide,
@@ -51,7 +51,7 @@ TileJob tiles(const ConvSizes& s, Dim channels, Dim first, Dim count) {
           .step = place_step(count, channels)};
 }
 
-// Of the places u of the weights.
+// Convolves x with weights that were transformed into u, [36 places,cin,cout]; adds to y or sets it.
 void filter(const ConvSizes& s, const real* x, const Tensor& u, const real* bias, real negative_slope,
             Slot y) {
   const IsaKernels& isa = isa_kernels();

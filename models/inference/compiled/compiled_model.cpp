@@ -7,6 +7,7 @@
 
 #include "autograd/kernels/fast/isa/isa.h"
 #include "autograd/kernels/fast/pool.h"
+#include "autograd/record.h"
 #include "models/inference/compiled/compiler.h"
 #include "models/inference/compiled/integer_plan.h"
 
@@ -22,8 +23,8 @@ CompiledModel::CompiledModel(const SuperTac& network, const ActivationRanges& ra
 Estimate CompiledModel::estimate(const Tensor& inputs) const {
   if (plan_ == nullptr && integers_ == nullptr) return network_->estimate(inputs);
   if (inputs.rank() < 1 || inputs.shape() != network_->input_shape(inputs.dim(0)))
-    throw std::invalid_argument("CompiledModel: inputs expects " + network_->input_shape(0).text() +
-                                " with any first size, got " + inputs.shape().text());
+    refuse("CompiledModel", "inputs", "[N" + network_->input_shape(0).text().substr(2),
+           inputs.shape().text());
   return integers_ ? integers_->run(inputs) : plan_->run(inputs);
 }
 
@@ -125,11 +126,11 @@ Estimate Plan::run(const Tensor& inputs) const {
 static double square(real x) { return static_cast<double>(x) * static_cast<double>(x); }
 
 Ensemble::Ensemble(std::vector<CompiledModel> members) : members_(std::move(members)) {
-  if (members_.empty()) throw std::invalid_argument("Ensemble: expected at least one network, got none");
+  if (members_.empty()) refuse("Ensemble", "members", "one network or more", "none");
   for (const CompiledModel& member : members_)
     if (member.network().format() != first().format())
-      throw std::invalid_argument("Ensemble: expected networks of one format, got one of " +
-                                  text(first().format()) + " and one of " + text(member.network().format()));
+      refuse("Ensemble", "members", "networks of one format, " + text(first().format()),
+             text(member.network().format()));
 }
 
 Estimate Ensemble::estimate(const Tensor& inputs) const {
@@ -144,7 +145,7 @@ Estimate Ensemble::estimate(const Tensor& inputs) const {
   for (std::size_t m = 0; m < members_.size(); ++m) {
     const Estimate one = m == 0 ? mean : members_[m].estimate(inputs);
     if (one.predicted_error.defined() != predicted_error)
-      throw std::invalid_argument("Ensemble: some of the networks predict their error, others do not");
+      refuse("Ensemble", "members", "networks that all predict their error, or none", "some that do");
     for (std::size_t i = 0; i < errors; ++i)
       squares[i] += square(one.picture.values()[i]) + square(one.predicted_error.values()[i]);
     for (std::size_t i = 0; m > 0 && i < pixels; ++i) mean.picture.values()[i] += one.picture.values()[i];

@@ -1,7 +1,7 @@
 // A network that was compiled for drawing many pictures. Its forward pass is traced once (autograd/trace.h)
 // and becomes a list of steps on planned memory. The weights are packed and transformed once, nothing is
-// recorded on a graph, and a warm call neither takes memory from the heap nor waits for a lock. And several
-// of them that draw one picture.
+// recorded on a graph, and a warm call neither takes memory from the heap nor waits for a lock. Ensemble
+// averages several of them.
 #pragma once
 
 #include <memory>

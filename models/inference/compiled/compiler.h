@@ -1,6 +1,6 @@
 // The steps of a compiled model, the memory that they work on, and what makes them of the ops that one
-// inference ran. They are in compiled_model.cpp; plan_steps.cpp and plan_winograd.cpp make the step of each
-// op.
+// inference ran. Plan and Compiler are in compiled_model.cpp; plan_steps.cpp and plan_winograd.cpp make the
+// step of each op.
 #pragma once
 
 #include <functional>

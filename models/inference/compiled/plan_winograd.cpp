@@ -34,7 +34,7 @@ struct Winograd {
 
   Dim side() const { return from.square + 2; }
   Dim side(Taps t) const { return t == Taps::three ? side() : side() - 1; }
-  /// Of v, and of m behind it.
+  /// Numbers in v; m, behind it in scratch, is as large for its own channels.
   Dim places(Dim channels) const { return side() * side() * place_step(kTilesAtOnce, channels); }
   Dim scratch() const { return places(from.channels) + places(to.channels); }
   void add(Filters f, const Tensor& w, const std::vector<Dim>& taps);

@@ -14,10 +14,9 @@
 namespace supertac {
 
 void LossWeights::check() const {
-  if (a >= 0 && a <= 1 && beta >= 0 && lambda >= 0) return;
-  throw std::invalid_argument(
-      "loss weights: expected 0 <= a <= 1, beta >= 0, lambda >= 0, got a = " + std::to_string(a) +
-      ", beta = " + std::to_string(beta) + ", lambda = " + std::to_string(lambda));
+  if (!(a >= 0 && a <= 1)) refuse("loss", "a", "0 to 1", digits(a));
+  if (!(beta >= 0)) refuse("loss", "beta", "0 or more", digits(beta));
+  if (!(lambda >= 0)) refuse("loss", "lambda", "0 or more", digits(lambda));
 }
 
 void LossTerms::add(const LossTerms& other) {

@@ -8,7 +8,7 @@
 #include <typeinfo>
 
 #include "data/clock/frame_clock.h"
-#include "data/frames/board_frame.h"
+#include "data/frames/binary_decoder.h"
 #include "data/frames/sensor_decoder.h"
 #include "data/recordings/imports/imports.h"
 #include "data/recordings/recording.h"
@@ -146,7 +146,7 @@ void use_recording(const std::string& path) {
   if (windows.size() == 0) return;
   std::vector<float> truth(windows.image().pixels());
   for (const std::size_t i : {std::size_t{0}, windows.size() - 1}) {
-    (void)windows.window(i);
+    (void)windows.raw_window(i);
     windows.truth(i, truth);
     (void)windows.zone(i);
   }

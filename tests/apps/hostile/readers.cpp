@@ -3,7 +3,7 @@
 #include <iostream>
 #include <vector>
 
-#include "data/frames/board_frame.h"
+#include "data/frames/binary_decoder.h"
 #include "data/plates/plate.h"
 #include "data/plates/stl.h"
 #include "data/recordings/imports/imports.h"

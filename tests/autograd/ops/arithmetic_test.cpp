@@ -1,3 +1,5 @@
+// Gradients, empty inputs and empty Variables of these ops: their rows of apps/check/gradient_cases.cpp,
+// which tests/layers/gradient_test.cpp tries.
 #include "autograd/ops/arithmetic.h"
 
 #include "tests/autograd/check.h"

@@ -1,3 +1,5 @@
+// Gradients, empty inputs and empty Variables of these ops: their rows of apps/check/gradient_cases.cpp,
+// which tests/layers/gradient_test.cpp tries.
 #include "autograd/ops/shaping.h"
 
 #include "autograd/ops/arithmetic.h"
@@ -85,6 +87,7 @@ TEST(Shaping, RefusesWhatDoesNotFit) {
   EXPECT_REFUSAL("concat: xs expects 1 to 8 inputs, got 0", joined({}));
   EXPECT_REFUSAL("concat: xs expects 1 to 8 inputs, got 9", joined(std::vector<Variable>(9, x)));
   EXPECT_REFUSAL("concat: x0 expects rank 1 or more, got []", joined({scalar}));
+  EXPECT_REFUSAL("concat: x1 expects rank 2, got []", joined({x, scalar}));
   EXPECT_REFUSAL("concat: x1 expects [2,4], got [3,4]", joined({x, zeros({3, 4})}));
   EXPECT_REFUSAL("flatten_channels_first: x expects rank 3 or 4, got [2,3]", flatten_channels_first(x));
   EXPECT_REFUSAL("unflatten_channels_first: x expects rank 2, got []", unflattened(scalar, {1}));

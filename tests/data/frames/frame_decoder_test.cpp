@@ -1,4 +1,4 @@
-#include "data/frames/board_frame.h"
+#include "data/frames/binary_decoder.h"
 
 #include "tests/hardware/rig_support.h"
 #include "tests/support/test.h"

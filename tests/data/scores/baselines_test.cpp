@@ -96,8 +96,8 @@ TEST(Bicubic, TakesArraysOfAnyShape) {
 
 TEST(Bicubic, RefusesOtherSizes) {
   std::vector<float> out(256);
-  EXPECT_REFUSAL("bicubic: rows, columns and scale must be at least 1, got 4, 4 and 0", Bicubic(4, 4, 0));
-  EXPECT_REFUSAL("bicubic: rows, columns and scale must be at least 1, got 0, 4 and 2", Bicubic(0, 4, 2));
+  EXPECT_REFUSAL("bicubic: scale expects 1 or more, got 0", Bicubic(4, 4, 0));
+  EXPECT_REFUSAL("bicubic: rows expects 1 or more, got 0", Bicubic(0, 4, 2));
   EXPECT_REFUSAL("baseline: a frame expects 16 values, got 15",
                  Bicubic(4, 4, 4)(std::vector<float>(15), out));
   EXPECT_REFUSAL("baseline: the image expects 64 values, got 256",

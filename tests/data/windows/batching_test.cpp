@@ -99,7 +99,7 @@ TEST(Batching, FewerWindowsThanABatchMakeOneBatch) {
 
 TEST(Batching, RefusesWhatIsNotThere) {
   EXPECT_REFUSAL("batching: there is no window to train on", Batching({}, 16, 3));
-  EXPECT_REFUSAL("batching: the batch size must be at least 1, got 0", Batching(hundred(), 0, 3));
+  EXPECT_REFUSAL("batching: batch expects 1 or more, got 0", Batching(hundred(), 0, 3));
   const Batching batching(hundred(), 16, 3);
   std::vector<std::uint32_t> batch(16), small(15);
   EXPECT_REFUSAL("batching: expected a batch below 6 and room for 16 windows, got batch 6 and room for 16",

@@ -204,12 +204,10 @@ TEST(LiveWindow, TakesADamagedFrameAsLost) {
 
 TEST(LiveWindow, RefusesSettingsOutOfRangeAndAWrongRoom) {
   const std::pair<LiveWindowSettings, const char*> cases[] = {
-      {{.timesteps = 0}, "timesteps must be at least 1, got 0"},
-      {{.rate_hz = 0},
-       "rate_hz, frame_period_s and max_gap_s must be positive, span not 0, got 0.000000, 0.003333, "
-       "0.050000 and 0.360000"},
-      {{.filter_s = -1}, "filter_s must not be negative, got -1.000000"},
-      {{.filter_s = std::nan("")}, "filter_s must not be negative, got nan"}};
+      {{.timesteps = 0}, "timesteps expects 1 or more, got 0"},
+      {{.rate_hz = 0}, "rate_hz expects more than 0, got 0"},
+      {{.filter_s = -1}, "filter_s expects 0 or more, got -1"},
+      {{.filter_s = std::nan("")}, "filter_s expects 0 or more, got nan"}};
   for (const auto& [settings, refusal] : cases)
     EXPECT_REFUSAL(std::string("live window: ") + refusal, LiveWindow{settings});
   LiveWindow live(live_settings(300));

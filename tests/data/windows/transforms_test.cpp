@@ -210,11 +210,11 @@ TEST(Augment, RefusesNegativeMagnitudes) {
   const auto message = [](const AugmentSettings& settings) {
     return what_of<std::invalid_argument>([&] { check(settings); });
   };
-  EXPECT_EQ(message({.gain = -1}), "augmentation: gain must be 0 (off) or positive, got -1.000000");
+  EXPECT_EQ(message({.gain = -1}), "augmentation: gain expects 0 (off) or more, got -1");
   EXPECT_EQ(message({.noise = std::numeric_limits<double>::quiet_NaN()}),
-            "augmentation: noise must be 0 (off) or positive, got nan");
-  EXPECT_EQ(message({.dropped = 17}), "augmentation: dropped must be 0 to 16 taxels, got 17");
-  EXPECT_EQ(message({.dropped = -1}), "augmentation: dropped must be 0 to 16 taxels, got -1");
+            "augmentation: noise expects 0 (off) or more, got nan");
+  EXPECT_EQ(message({.dropped = 17}), "augmentation: dropped expects 0 to 16, got 17");
+  EXPECT_EQ(message({.dropped = -1}), "augmentation: dropped expects 0 to 16, got -1");
   std::vector<float> window(17);
   EXPECT_REFUSAL("augment: a window of 4x4 taxels at 3 mm is [T][16], got 17 values",
                  augment({.gain = 1}, 1, 1, window));
@@ -242,7 +242,7 @@ TEST(Augment, AnyArray) {
   EXPECT_NEAR(static_cast<double>(dropped), 50, 20);
   EXPECT_GT(levels.size(), 1800U);  // of 2250, some of which are clipped or dropped
   std::vector<float> window(array.signals());
-  EXPECT_REFUSAL("augmentation: dropped must be 0 to 15 taxels, got 16",
+  EXPECT_REFUSAL("augmentation: dropped expects 0 to 15, got 16",
                  augment({.dropped = 16}, 1, 1, window, array));
   EXPECT_REFUSAL("augment: a window of 3x5 taxels at 3 mm with 3 channels is [T][45], got 44 values",
                  augment({.gain = 1}, 1, 1, std::span(window).first(44), array));

@@ -1,7 +1,7 @@
 // Collections with another sensor than the rig's board, on another bed: a text sensor of 100 Hz rides on the
 // simulated rig's head, and every frame carries its number.
 
-#include "data/frames/board_frame.h"
+#include "data/frames/binary_decoder.h"
 #include "hardware/collection/collection.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "io/files/file.h"

@@ -131,10 +131,14 @@ TEST(SignalFeatures, FollowTheArray) {
 
 TEST(SignalFeatures, RefuseAPieceOfAFrame) {
   const std::vector<float> piece(16 * 16 - 1), short_one(15 * 16);
-  EXPECT_REFUSAL("signal features: expects 16 or more frames of 16 and room for 35, got 255 and 35",
-                 signal_features(piece, TaxelArray{}));
-  EXPECT_REFUSAL("signal features: expects 16 or more frames of 16 and room for 35, got 240 and 35",
-                 signal_features(short_one, TaxelArray{}));
+  EXPECT_REFUSAL(
+      "signal features: window expects 1 frame or 16 or more of 16 signals, and out room for 35, got 255 "
+      "signals and room for 35",
+      signal_features(piece, TaxelArray{}));
+  EXPECT_REFUSAL(
+      "signal features: window expects 1 frame or 16 or more of 16 signals, and out room for 35, got 240 "
+      "signals and room for 35",
+      signal_features(short_one, TaxelArray{}));
 }
 
 }  // namespace supertac::novelty_test

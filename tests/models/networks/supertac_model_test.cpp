@@ -126,7 +126,8 @@ TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
   EXPECT_REFUSAL("SuperTac: eps expects 4 tensors, got 0", model.forward(Tensor::zeros({1, 32, 16}), {}));
   EXPECT_REFUSAL("model settings: grouping expects horizontal or vertical, got \"diagonal\"",
                  grouping_of("diagonal"));
-  EXPECT_REFUSAL("unknown preset \"huge\"; known: paper, tiny, frame", SuperTacSettings::of_preset("huge"));
+  EXPECT_REFUSAL("model settings: preset expects paper, tiny or frame, got \"huge\"",
+                 SuperTacSettings::of_preset("huge"));
 }
 
 TEST(TextureClassifier, TakesFramesAndPictures) {

@@ -56,26 +56,27 @@ TEST(Recipe, NamedOnesSeeTwoAndAHalfSeconds) {
   EXPECT_LT(2 * tiny.rate_hz * static_cast<double>(tiny.epochs) / 9,
             paper.rate_hz * static_cast<double>(paper.epochs))
       << "half the work of a training of paper";
-  EXPECT_REFUSAL("unknown preset \"small\"; known: paper, tiny, frame", Recipe::named("small"));
+  EXPECT_REFUSAL("model settings: preset expects paper, tiny or frame, got \"small\"",
+                 Recipe::named("small"));
 }
 
 TEST(Recipe, RefusesWhatNoTrainingHas) {
   const std::pair<void (*)(Recipe&), const char*> cases[] = {
-      {[](Recipe& r) { r.stride = 0; }, "recipe: expected stride from 1 to 100000, got 0"},
+      {[](Recipe& r) { r.stride = 0; }, "recipe: stride expects 1 to 100000, got 0"},
       {[](Recipe& r) { r.delay_s = 2.56; },
-       "recipe: expected a delay from 0 to less than the window, got 2.56"},
-      {[](Recipe& r) { r.rate_hz = 5; }, "recipe: expected rate_hz from 20 to 2000, got 5"},
-      {[](Recipe& r) { r.random_plates = -1; }, "recipe: expected random_plates from 0 to 50000, got -1"},
+       "recipe: delay_s expects 0 to less than the window lasts, got 2.56"},
+      {[](Recipe& r) { r.rate_hz = 5; }, "recipe: rate_hz expects 20 to 2000, got 5"},
+      {[](Recipe& r) { r.random_plates = -1; }, "recipe: random_plates expects 0 to 50000, got -1"},
       {[](Recipe& r) { r.range = Scaling{.rest = 1, .span = 0}; },
-       "recipe: expected a span that is not 0, got 0"},
+       "recipe: range expects a span that is not 0, got 0"},
       {[](Recipe& r) { r.leave_out = {"3_Bumps"}; }, "--split texture"},
-      {[](Recipe& r) { r.epochs = 0; }, "recipe: expected epochs from 1 to 100000, got 0"},
-      {[](Recipe& r) { r.batch = 5000; }, "recipe: expected batch from 1 to 4096, got 5000"},
-      {[](Recipe& r) { r.learning_rate = 2; }, "recipe: expected learning_rate above 0 and at most 1, got 2"},
-      {[](Recipe& r) { r.warm_up = 1; },
-       "recipe: expected warm_up as a share of all steps, 0 to below 1, got 1"},
-      {[](Recipe& r) { r.clip_norm = -1; }, "recipe: expected clip_norm of 0 (never) or more, got -1"},
-      {[](Recipe& r) { r.loss.beta = -1; }, "beta = -1"},
+      {[](Recipe& r) { r.epochs = 0; }, "recipe: epochs expects 1 to 100000, got 0"},
+      {[](Recipe& r) { r.batch = 5000; }, "recipe: batch expects 1 to 4096, got 5000"},
+      {[](Recipe& r) { r.learning_rate = 2; },
+       "recipe: learning_rate expects more than 0 and at most 1, got 2"},
+      {[](Recipe& r) { r.warm_up = 1; }, "recipe: warm_up expects a share of all steps, 0 to below 1, got 1"},
+      {[](Recipe& r) { r.clip_norm = -1; }, "recipe: clip_norm expects 0 (never) or more, got -1"},
+      {[](Recipe& r) { r.loss.beta = -1; }, "beta expects 0 or more, got -1"},
       {[](Recipe& r) { r.model.latent = 0; }, "latent"}};
   for (const auto& [spoil, said] : cases) {
     Recipe recipe = Recipe::named("tiny");

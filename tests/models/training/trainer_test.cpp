@@ -230,7 +230,7 @@ TEST(Trainer, RefusesWindowsOfAnotherFormatOrNone) {
 TEST(Trainer, RefusesWhatTheArrayCannotDo) {
   SmallTraining small;
   small.recipe.augment.dropped = 17;
-  EXPECT_REFUSAL("augmentation: dropped must be 0 to 16 taxels, got 17", small.trainer());
+  EXPECT_REFUSAL("augmentation: dropped expects 0 to 16, got 17", small.trainer());
 }
 
 }  // namespace supertac::trainer_test

@@ -159,7 +159,7 @@ TEST(CompiledModel, RefusesRangesThatAreNotFiniteOrNoPairs) {
 
 TEST(CompiledModel, RefusesInputsOfAnotherShape) {
   const SuperTac network = random_network();
-  EXPECT_REFUSAL("CompiledModel: inputs expects [0,32,16] with any first size, got [1,3,16]",
+  EXPECT_REFUSAL("CompiledModel: inputs expects [N,32,16], got [1,3,16]",
                  CompiledModel(network).estimate(Tensor::zeros({1, 3, 16})));
   EXPECT_EQ(CompiledModel(network).estimate(Tensor::zeros(network.input_shape(0))).picture.dim(0), 0);
 }
@@ -223,7 +223,7 @@ void expect_refused(const std::vector<std::string>& paths, const std::string& wh
 }
 
 TEST(Ensemble, SaysWhichModelsDoNotBelongTogether) {
-  EXPECT_REFUSAL("Ensemble: expected at least one network, got none", Ensemble({}));
+  EXPECT_REFUSAL("Ensemble: members expects one network or more, got none", Ensemble({}));
   const TemporaryFolder folder;
   const auto saved = [&](const char* name, const SuperTacSettings& settings, double rate_hz = 300,
                          const std::map<std::string, std::string>& metadata = {}) {
@@ -250,8 +250,8 @@ TEST(Ensemble, RefusesNetworksOfOtherInputs) {
   twice_as_long.timesteps = 64;
   const SuperTac one = random_network(), longer = random_network(twice_as_long);
   EXPECT_REFUSAL(
-      "Ensemble: expected networks of one format, got one of 32 frame(s) of 4x4 taxels with 1 channel(s) and "
-      "pictures of 8x8 and one of 64 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8",
+      "Ensemble: members expects networks of one format, 32 frame(s) of 4x4 taxels with 1 channel(s) and "
+      "pictures of 8x8, got 64 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8",
       Ensemble({CompiledModel(one), CompiledModel(longer)}));
 }
 

@@ -80,14 +80,8 @@ TEST(SuperTacLoss, RefusesTruthOfAnotherSizeAndNegativeWeights) {
                  supertac_loss(s.output, uniform({2, 16, 16, 1}, 3), {}));
   EXPECT_REFUSAL("picture_loss: truth expects [2,8,8,1], got [2,8,1]",
                  picture_loss(s.output.picture, uniform({2, 8, 1}, 3), 0.1));
-  EXPECT_REFUSAL(
-      "loss weights: expected 0 <= a <= 1, beta >= 0, lambda >= 0, got a = 2.000000, beta = 0.001000, "
-      "lambda = 0.100000",
-      LossWeights{.a = 2}.check());
-  EXPECT_REFUSAL(
-      "loss weights: expected 0 <= a <= 1, beta >= 0, lambda >= 0, got a = 0.200000, beta = -1.000000, "
-      "lambda = 0.100000",
-      LossWeights{.beta = -1}.check());
+  EXPECT_REFUSAL("loss: a expects 0 to 1, got 2", LossWeights{.a = 2}.check());
+  EXPECT_REFUSAL("loss: beta expects 0 or more, got -1", LossWeights{.beta = -1}.check());
 }
 
 constexpr real kNan = std::numeric_limits<real>::quiet_NaN();
