@@ -27,7 +27,7 @@ class Backward {
   const Tensor& value(std::size_t input) const { return node_.inputs[input]->value; }
   /// Where to leave the gradient of that input; empty when it requires none. At first use the contents are
   /// undefined and all of them must be written; a step that adds to an element more than once (sums, maxima)
-  /// has Slot::begin() fill them with zeros. Asked for in the order of the inputs.
+  /// has Slot::begin() fill them with zeros. A step asks for its slots in the order of the inputs.
   Slot slot_of(std::size_t input);
   /// dL/dy to be changed in place: this step is its only reader.
   Tensor& mutable_gy() { return node_.grad; }

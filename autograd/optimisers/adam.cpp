@@ -61,7 +61,7 @@ Adam::Adam(std::vector<Variable> parameters, const AdamOptions& options)
   for (std::size_t k = 0; k < parameters_.size(); ++k) {
     Variable& p = parameters_[k];
     if (!p.requires_grad())
-      refuse("Adam", "parameter " + std::to_string(k), "to require a gradient", "a constant");
+      refuse("Adam", "parameter " + std::to_string(k), "a variable that requires a gradient", "a constant");
     (options.muon && is_matrix(p.shape()) ? matrices_ : others_).push_back(k);
     p.mutable_grad() = Tensor::zeros(p.shape());
     m_.push_back(Tensor::zeros(p.shape()));

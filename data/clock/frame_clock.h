@@ -65,7 +65,8 @@ struct FrameDate {
   double doubt_s() const { return std::max(to_s - time_s, time_s - from_s); }
 };
 
-/// Dates frames as they come. With stamps the dates are of the device's clock, without those of the port's.
+/// Dates frames as they come. With stamps dates are on the device's clock, without stamps on the
+/// port's.
 class FrameClock {
  public:
   explicit FrameClock(const ClockSettings& settings);

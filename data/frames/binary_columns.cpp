@@ -157,7 +157,7 @@ std::uint64_t microseconds(double seconds) {
 
 }  // namespace
 
-BinaryColumns::BinaryColumns(Bytes bytes, const Stretch& stretch, double seconds)
+BinaryColumns::BinaryColumns(Bytes bytes, const ByteStretch& stretch, double seconds)
     : bytes_(bytes), stretch_(stretch), steps_(stretch.rows - 2) {
   find_constants();
   find_values();

@@ -36,16 +36,16 @@ std::string framing_of(Bytes bytes);
 std::string word_in(Bytes bytes, std::size_t period);
 
 /// Periods in a row in which nothing was lost.
-struct Stretch {
+struct ByteStretch {
   std::size_t period = 0, begin = 0, rows = 0;
 };
 /// The longest one: the bytes that return a period later outweigh what returns by chance.
-Stretch stretch_of(Bytes bytes, std::size_t period);
+ByteStretch stretch_of(Bytes bytes, std::size_t period);
 
 /// What came after a pause begins a frame: cost of where the pauses ended, for each byte of the period. The
 /// first of `bytes` bytes that are looked at is `first_byte` of those heard.
 std::vector<double> bits_of_starts(std::span<const Heard> heard, std::size_t first_byte,
-                                   const Stretch& stretch, double seconds, std::size_t bytes);
+                                   const ByteStretch& stretch, double seconds, std::size_t bytes);
 
 /// A field that is no value, as it may stand in a period from some byte on.
 struct FieldFound {
@@ -64,7 +64,7 @@ struct FieldFound {
 class BinaryColumns {
  public:
   /// `seconds`: what the stretch took, 0 where it came at once.
-  BinaryColumns(Bytes bytes, const Stretch& stretch, double seconds);
+  BinaryColumns(Bytes bytes, const ByteStretch& stretch, double seconds);
 
   /// As values of one type, from every byte of the period on.
   struct Values {
@@ -91,7 +91,7 @@ class BinaryColumns {
   const std::vector<FieldFound>& fields(std::size_t at) const { return fields_[at % stretch_.period]; }
   /// Whether a checksum of this kind at byte `end` of the period is right for the bytes from `begin` on.
   bool is_checksum(const std::string& kind, bool big_endian, std::size_t begin, std::size_t end) const;
-  const Stretch& stretch() const { return stretch_; }
+  const ByteStretch& stretch() const { return stretch_; }
 
  private:
   const unsigned char* at(std::size_t row, std::size_t column) const {
@@ -103,7 +103,7 @@ class BinaryColumns {
   void add_counter(std::size_t column, std::size_t width, bool big_endian, double seconds, bool real);
 
   Bytes bytes_;
-  Stretch stretch_;
+  ByteStretch stretch_;
   std::size_t steps_;  // from row to row
   std::vector<double> constant_;
   std::vector<unsigned char> usual_;

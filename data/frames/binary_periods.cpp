@@ -83,14 +83,14 @@ std::vector<std::size_t> periods_of(Bytes bytes) {
   return periods;
 }
 
-Stretch stretch_of(Bytes bytes, std::size_t period) {
+ByteStretch stretch_of(Bytes bytes, std::size_t period) {
   const std::size_t rows = bytes.size() / period;
   std::vector<double> shares;
   for (std::size_t k = 0; k + 1 < rows; ++k)
     shares.push_back(static_cast<double>(equal_bytes(&bytes[k * period], &bytes[(k + 1) * period], period)));
   if (shares.empty()) return {period, 0, 0};
   const double enough = 0.6 * median(std::vector(shares));
-  Stretch best{period, 0, 0};
+  ByteStretch best{period, 0, 0};
   double sum = 0, most = 0;
   std::size_t begin = 0;
   for (std::size_t k = 0; k < shares.size(); ++k) {
@@ -103,7 +103,7 @@ Stretch stretch_of(Bytes bytes, std::size_t period) {
 }
 
 std::vector<double> bits_of_starts(std::span<const Heard> heard, std::size_t first_byte,
-                                   const Stretch& stretch, double seconds, std::size_t bytes) {
+                                   const ByteStretch& stretch, double seconds, std::size_t bytes) {
   const std::size_t period = stretch.period;
   std::vector<std::size_t> counts(period);
   std::size_t all = 0, at = 0;

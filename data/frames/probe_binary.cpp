@@ -299,7 +299,7 @@ std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::op
   const Bytes bytes = Bytes(reinterpret_cast<const unsigned char*>(all.data()), all.size()).subspan(first);
   std::vector<BinaryReading> found;
   for (const std::size_t period : periods_of(bytes)) {
-    const Stretch stretch = stretch_of(bytes, period);
+    const ByteStretch stretch = stretch_of(bytes, period);
     if (stretch.rows < 8) continue;
     const double share = static_cast<double>((stretch.rows - 2) * period) / static_cast<double>(all.size());
     const BinaryColumns columns(bytes, stretch, seconds < kAtOnceS ? 0 : seconds * share);

@@ -19,8 +19,8 @@ using Parts = std::array<double, kParts + 1>;  // the whole, and without each pa
 
 enum class Rows { in_turn, swapped, even_first };
 
-Layout layout_of(int rows, int columns, bool serpentine, Rows turn) {
-  Layout layout{rows, columns, {}};
+ArrayLayout layout_of(int rows, int columns, bool serpentine, Rows turn) {
+  ArrayLayout layout{rows, columns, {}};
   for (int row = 0; row < rows; ++row) {
     const int half = (rows + 1) / 2;
     const int sent = turn == Rows::swapped      ? std::min(row ^ 1, rows - 1)
@@ -32,7 +32,7 @@ Layout layout_of(int rows, int columns, bool serpentine, Rows turn) {
   return layout;
 }
 
-Pairs pairs_of(const Layout& layout) {
+Pairs pairs_of(const ArrayLayout& layout) {
   Pairs pairs;
   const auto add = [&](int k, int other) {
     const int a = layout.order[static_cast<std::size_t>(k)],
@@ -95,7 +95,7 @@ double lead(const Parts& a, const Parts& b) {
 
 }  // namespace
 
-std::string Layout::text() const {
+std::string ArrayLayout::text() const {
   const auto at = [&](int row) { return order[static_cast<std::size_t>(row * columns)] / columns; };
   const auto first = [&](int row) { return order[static_cast<std::size_t>(row * columns)] % columns; };
   std::string text = std::to_string(rows) + " rows of " + std::to_string(columns);
@@ -111,7 +111,7 @@ FoundLayout find_layout(std::span<const std::vector<float>> signals) {
   const int taxels = static_cast<int>(signals.size());
   if (taxels < 2 || signals[0].size() < 2 * kParts) return {{}, "too few frames to tell the layout from"};
   struct Candidate {
-    Layout layout;
+    ArrayLayout layout;
     Parts score;
   };
   const Felt felt(signals);
@@ -121,7 +121,7 @@ FoundLayout find_layout(std::span<const std::vector<float>> signals) {
     for (const bool serpentine : {false, true})
       for (const Rows turn : {Rows::in_turn, Rows::swapped, Rows::even_first}) {
         if (taxels % rows != 0 || taxels / rows > kMostSide) continue;
-        const Layout layout = layout_of(rows, taxels / rows, serpentine, turn);
+        const ArrayLayout layout = layout_of(rows, taxels / rows, serpentine, turn);
         if (const auto [pairs, is_new] = seen.insert(pairs_of(layout)); is_new)
           candidates.push_back({layout, felt.score(*pairs)});
       }

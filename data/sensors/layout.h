@@ -9,14 +9,14 @@
 namespace supertac {
 
 /// Rows and columns of an array whose frames send taxel k as their order[k]-th; empty: as k.
-struct Layout {
+struct ArrayLayout {
   int rows = 1, columns = 1;
   std::vector<int> order = {};
   std::string text() const;  ///< "6 rows of 10, every second row backwards"
 };
 
 struct FoundLayout {
-  std::optional<Layout> layout;  ///< empty where it cannot be told
+  std::optional<ArrayLayout> layout;  ///< empty where it cannot be told
   std::string says;              ///< for people, a line
 };
 

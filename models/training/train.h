@@ -68,9 +68,8 @@ struct TrainingCallbacks {
   double seconds_before = 0;  ///< on the log's clock when this process began
 };
 
-/// Trains until the last step, until Trainer::done() where a group is held out, or to the end of the
-/// step in which `stop` returns true; returns whether all steps are done. Throws as Trainer::train_step and
-/// Trainer::save.
+/// Trains until Trainer::done(), or to the end of the step in which `stop` returns true; returns whether all
+/// steps are done. Throws as Trainer::train_step and Trainer::save.
 bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks = {});
 
 /// What the model file says of its origin after training: task.origin, and where the recipe leaves it open

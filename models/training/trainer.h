@@ -173,10 +173,10 @@ class Trainer {
     Batch batch;
     LossTerms terms;
     Variances variances;
-    std::string trouble;  // where the loss stopped to be finite
+    std::string trouble;  // where the loss stopped being finite
     std::exception_ptr error;
   };
-  // Of one micro-batch: its windows and truths, its noise, and with both forward, loss and backward.
+  // These work on one micro-batch: take windows and truths, draw noise, go forward and backward.
   void fill(MicroBatch& micro_batch) const;
   void draw_noise(MicroBatch& micro_batch) const;
   void run(MicroBatch& micro_batch) const;

@@ -43,13 +43,16 @@ inline testing::AssertionResult has_values(const Tensor& found, const Shape& sha
                                            std::initializer_list<double> expected,
                                            double tolerance = kRounding) {
   if (found.shape() != shape) return testing::AssertionFailure() << "found " << found.shape().text();
+  if (expected.size() != found.values().size())
+    return testing::AssertionFailure() << found.size() << " elements, expected " << expected.size();
   const real* value = found.data();
   for (const double wanted : expected) {
     if (!(std::abs(static_cast<double>(*value) - wanted) <= tolerance * std::max(1.0, std::abs(wanted))))
-      return testing::AssertionFailure() << "element " << value - found.data() << " is " << *value;
+      return testing::AssertionFailure() << "element " << value - found.data() << " of " << shape.text()
+                                         << " is " << *value << ", expected " << wanted;
     ++value;
   }
-  return testing::AssertionResult(value == found.data() + found.size()) << "of other elements";
+  return testing::AssertionSuccess();
 }
 
 /// A tensor, its shape, its elements {1, 2 ...} and, where rounding is larger than usual, a tolerance.

@@ -23,8 +23,8 @@ void Margin::widen(const ConvSettings& s) {
 
 // The outputs first, first + stride, ... of a transposed convolution along one axis: output first + stride t
 // sees the inputs t + base - j through the taps tap + stride j, j = taps - 1 ... 0.
-struct Phase {
-  Phase(Dim first, Dim out, Dim kernel, Dim stride, Dim padding)
+struct AxisPhase {
+  AxisPhase(Dim first, Dim out, Dim kernel, Dim stride, Dim padding)
       : count((out - first + stride - 1) / stride),
         tap((first + padding) % stride),
         base((first + padding) / stride),
@@ -33,7 +33,8 @@ struct Phase {
 };
 
 // [ky][kx][cin][cout] -> the taps of these phases in the order of their inputs.
-static Tensor phase_weights(const ConvSettings& s, const Phase& v, const Phase& h, const Variable& w) {
+static Tensor phase_weights(const ConvSettings& s, const AxisPhase& v, const AxisPhase& h,
+                            const Variable& w) {
   const Dim size = w.dim(w.rank() - 2) * w.dim(w.rank() - 1);
   Tensor out(Shape{v.taps * h.taps, size});
   real* to = out.data();
@@ -83,8 +84,8 @@ static std::vector<ProductTaps> transposed_conv(const TracedOp& op, const Featur
   std::vector<ProductTaps> products;
   for (Dim top = 0; top < s.stride_h; ++top) {
     for (Dim left = 0; left < s.stride_w; ++left) {
-      const Phase v(top, y.height, s.kernel_h, s.stride_h, s.padding_h);
-      const Phase h(left, y.width, s.kernel_w, s.stride_w, s.padding_w);
+      const AxisPhase v(top, y.height, s.kernel_h, s.stride_h, s.padding_h);
+      const AxisPhase h(left, y.width, s.kernel_w, s.stride_w, s.padding_w);
       if (v.count == 0 || h.count == 0) continue;
       ProductTaps taps{.height = v.count,
                        .width = h.count,

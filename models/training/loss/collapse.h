@@ -1,4 +1,4 @@
-// How a network fails in silence, when it stops to look at its input or blows up while the loss stays finite;
+// How a network fails in silence, when it stops looking at its input or blows up while the loss stays finite;
 // and where in the network it began, when the loss is not finite.
 #pragma once
 

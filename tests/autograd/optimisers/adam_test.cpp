@@ -121,7 +121,8 @@ TEST(Adam, RefusesBadOptions) {
     const AdamOptions& bad = options;
     EXPECT_REFUSAL("Adam: " + std::string(text), Adam({parameter(Tensor::zeros({1}))}, bad));
   }
-  EXPECT_REFUSAL("Adam: parameter 0 expects to require a gradient, got a constant", Adam({zeros({1})}, {}));
+  EXPECT_REFUSAL("Adam: parameter 0 expects a variable that requires a gradient, got a constant",
+                 Adam({zeros({1})}, {}));
 }
 
 TEST(Muon, MovesMatricesAlongTheOrthogonalFactorAndTheRestAsAdam) {

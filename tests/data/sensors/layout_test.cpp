@@ -41,7 +41,7 @@ struct Pressing {
     return sent;
   }
   // The pairs side by side, as the frame has them: the same for what is mirrored or turned.
-  bool is(const Layout& layout) const {
+  bool is(const ArrayLayout& layout) const {
     const auto at = [&](int row, int column) {
       const int k = row * layout.columns + column;
       return layout.order.empty() ? k : layout.order[static_cast<std::size_t>(k)];

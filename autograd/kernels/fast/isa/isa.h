@@ -35,9 +35,8 @@ struct OuterJob {
   Into into = Into::add;
 };
 /// Tiles of square x square pixels of maps for Winograd's transforms (winograd.cpp), numbered through a batch
-/// from `first` on, `count` of them. Place (i, j) of the k-th of them is places[((square + 2) i + j) * step +
-/// k
-/// * channels + c].
+/// from `first` on, `count` of them. Place (i, j) of the k-th of them is
+///   places[((square + 2) i + j) * step + k * channels + c]
 struct TileJob {
   Dim tiles_down = 0, tiles_across = 0;  // of an image
   Strides map;
@@ -102,8 +101,8 @@ std::vector<const IsaKernels*> supported_sets();
 /// Replaces the choice, for those who compare the sets in one process; not while kernels run.
 void use_isa(const IsaKernels& set);
 
-/// No kernels of this folder at all: the plain loops of autograd/kernels/conv.cpp
-/// run.
+/// Has no kernels: convolutions and linear layers run the loops of autograd/kernels/conv.cpp, all others
+/// those of each.h.
 extern const IsaKernels kPlainKernels;
 inline bool is_plain() { return isa_kernels().gather == nullptr; }
 
