@@ -17,7 +17,7 @@ struct ArrayLayout {
 
 struct FoundLayout {
   std::optional<ArrayLayout> layout;  ///< empty where it cannot be told
-  std::string says;              ///< for people, a line
+  std::string says;                   ///< for people, a line
 };
 
 /// Of `signals` [place in the frame][frame], while the array was pressed here and there, as how far each is

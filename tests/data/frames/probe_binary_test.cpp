@@ -174,9 +174,11 @@ Outcome outcome_of(Layout& layout) {
 
 TEST(ProbeBinary, DraftsLayoutsRightOrNot) {
   const auto count = static_cast<std::uint64_t>(mutations(24));
+  const char* first = std::getenv("SUPERTAC_FIRST_SEED");
+  const std::uint64_t from = first == nullptr ? 1 : std::strtoull(first, nullptr, 10);
   int right = 0;
   for (const Family family : {Family::tuned, Family::second, Family::third})
-    for (std::uint64_t seed = 1; seed <= count; ++seed) {
+    for (std::uint64_t seed = from; seed < from + count; ++seed) {
       Layout layout = layout_of(seed, family);
       const Outcome outcome = outcome_of(layout);
       right += outcome == Outcome::right ? 1 : 0;
