@@ -75,13 +75,17 @@ double within_rows(const std::vector<std::vector<double>>& rows, std::size_t per
   return total > 0 ? within / total : 1;
 }
 
-/// Numbers rise from line to line and do not begin anew: each line is a frame of its own.
+/// Numbers rise from line to line and do not begin anew: each line is a frame of its own. A `nan` between two
+/// numbers hides no fall.
 bool has_own_clock(const std::vector<std::vector<double>>& rows) {
   if (rows.size() < 4) return false;
   for (std::size_t c = 0; c < rows[0].size(); ++c) {
     std::size_t rose = 0, fell = 0;
-    for (std::size_t i = 1; i < rows.size(); ++i)
-      rose += rows[i][c] > rows[i - 1][c], fell += rows[i][c] < rows[i - 1][c];
+    double before = rows[0][c];
+    for (const std::vector<double>& row : rows) {
+      rose += row[c] > before, fell += row[c] < before;
+      if (!std::isnan(row[c])) before = row[c];
+    }
     if (10 * rose > 3 * rows.size() && 50 * fell <= rows.size()) return true;
   }
   return false;

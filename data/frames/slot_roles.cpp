@@ -123,11 +123,15 @@ int neat(std::size_t n) {
   return n <= 8 ? 2 : 1;
 }
 
-/// Sums and xors of the whole numbers before (and without) the last slot.
+/// Sums and xors of the whole numbers before (and without) the last slot, from one of the first four numbers
+/// on that are no words and no time of day.
 std::string sum_of_values(const TextGrammar& grammar, std::size_t slot) {
   const auto& stated = grammar.columns[slot];
   if (stated.size() < kFew || !whole(stated) || constant(stated)) return {};
-  for (std::size_t first = 0; first < std::min<std::size_t>(slot, 3); ++first)
+  int tried = 0;
+  for (std::size_t first = 0; first < slot && tried < 4; ++first) {
+    if (grammar.words[first] || grammar.wall[first]) continue;
+    ++tried;
     for (const double modulus : {0.0, 256.0, 65536.0, 100.0, 1000.0, -1.0}) {
       std::size_t fits = 0;
       for (std::size_t i = 0; i < stated.size(); ++i) {
@@ -148,6 +152,7 @@ std::string sum_of_values(const TextGrammar& grammar, std::size_t slot) {
         return (modulus < 0 ? "xor" : "sum") + std::string(modulus > 0 ? " modulo " + format(modulus) : "") +
                " of slots " + std::to_string(first) + " to " + std::to_string(slot - 1) + ", computed again";
     }
+  }
   return {};
 }
 
