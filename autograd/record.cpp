@@ -1,6 +1,6 @@
 // How ops become part of the graph, and how they refuse arguments.
 #include <algorithm>
-#include <sstream>
+#include <cstdio>
 #include <stdexcept>
 
 #include "autograd/trace.h"
@@ -43,10 +43,8 @@ void refuse(const std::string& op, const std::string& argument, const std::strin
 }
 
 std::string digits(double number) {
-  std::ostringstream out;
-  out.precision(9);
-  out << number;
-  return out.str();
+  char text[32];
+  return {text, static_cast<std::size_t>(std::snprintf(text, sizeof text, "%.9g", number))};
 }
 
 void check_defined(const char* op, const char* argument, const Variable& x) {

@@ -28,9 +28,8 @@ Window window_for(Dim height, Dim width) {
   Window w{side >= 11 ? 11 : std::min<Dim>(7, (side - 1) / 2 * 2 + 1)};
   std::array<double, 11> value{};
   double total = 0;
-  for (Dim i = 0; i < w.size; ++i) {
+  for (Dim i = 0; i < w.size; ++i)
     total += value[static_cast<std::size_t>(i)] = w.size < 11 ? 1.0 : kGaussian[std::abs(i - 5)];
-  }
   for (std::size_t i = 0; i < value.size(); ++i) w.weight[i] = static_cast<real>(value[i] / total);
   return w;
 }
@@ -91,13 +90,9 @@ class SsimImage {
     const real ma = mean_a_[i] + centre_a_, mb = mean_b_[i] + centre_b_;
     const real va = aa_[i] - mean_a_[i] * mean_a_[i], vb = bb_[i] - mean_b_[i] * mean_b_[i];
     const real cov = ab_[i] - mean_a_[i] * mean_b_[i];
-    return {ma,
-            mb,
-            va,
-            2 * ma * mb + kC1,
-            2 * cov + kC2,
-            ma * ma + mb * mb + kC1,
-            std::max(va, real(0)) + std::max(vb, real(0)) + kC2};
+    const real n1 = 2 * ma * mb + kC1, n2 = 2 * cov + kC2;
+    const real d1 = ma * ma + mb * mb + kC1, d2 = std::max(va, real(0)) + std::max(vb, real(0)) + kC2;
+    return {ma, mb, va, n1, n2, d1, d2};
   }
 
   // x, target [h,w] -> their centred images [h,w], and windowed means, squares and product [oh,ow]

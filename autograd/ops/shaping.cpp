@@ -86,7 +86,8 @@ Variable concat(std::span<const Variable> xs) {
                 });
 }
 
-static void check_runs(const Variable& x, const Runs& r) {
+// x [...,columns] -> y [...,width]: from column `first` on `run` columns, and so on every `step` columns
+Variable take_runs(const Variable& x, const Runs& r) {
   check_has_columns("take_runs", "x", x);
   check_no_gradient("take_runs", "x", x);
   const Dim columns = x.dim(x.rank() - 1);  // no sum or product below is larger than its square
@@ -98,18 +99,11 @@ static void check_runs(const Variable& x, const Runs& r) {
     refuse("take_runs", "width", "a multiple of run, " + std::to_string(r.run), std::to_string(r.width));
   const Dim end = r.first + (r.width / r.run - 1) * std::min(r.step, columns + 1) + r.run;
   if (end > columns) refuse("take_runs", "x", std::to_string(end) + " columns or more", x.shape().text());
-}
-
-// x [...,columns] -> y [...,width]: from column `first` on `run` columns, and so on every `step` columns
-Variable take_runs(const Variable& x, const Runs& r) {
-  check_runs(x, r);
-  const Dim columns = x.dim(x.rank() - 1);
   Tensor y(with_last(x.shape(), r.width));
   const Dim rows = x.size() / columns;
-  for (Dim at = 0; at < r.width; at += r.run) {
+  for (Dim at = 0; at < r.width; at += r.run)
     move_columns(rows, r.run, x.value().data(), {columns, r.first + at / r.run * r.step},
                  {y.data(), Into::overwrite}, {r.width, at});
-  }
   const OpSettings settings{.first = r.first, .run = r.run, .step = r.step};
   return record(
       "take_runs", y, {&x}, [](Backward&) {}, &settings);

@@ -294,6 +294,12 @@ TEST(ProbeBinary, FramingsAreRefusedByName) {
     }
 }
 
+TEST(ProbeBinary, EqualBytesAreRefusedAtOnce) {
+  Layout layout{.sensor = {}, .heard = {{100, std::string(1 << 22, '\0')}}, .says = {}};
+  EXPECT_EQ(outcome_of(layout), Outcome::refused);
+  EXPECT_NE(layout.says.find("nothing but the byte 0"), std::string::npos) << layout.says;
+}
+
 TEST(ProbeBinary, BytesThatRestAtLettersAreNoWords) {
   Layout layout;
   layout.sensor.array = {.rows = 4, .columns = 4};
