@@ -39,9 +39,8 @@ double sum_of_squares(Dim n, const real* x) {
 // The last bits of the C library's pow depend on the processor; products do not.
 double power(double base, std::int64_t exponent) {
   double result = 1;
-  for (; exponent > 0; exponent /= 2, base *= base) {
+  for (; exponent > 0; exponent /= 2, base *= base)
     if (exponent % 2 == 1) result *= base;
-  }
   return result;
 }
 
