@@ -33,13 +33,13 @@ Lag lag_of(std::size_t period, std::size_t equal, std::size_t count) {
 
 // Of lags in ascending order those after which at least half as much more returns than usual as after the
 // best. A multiple stays only if more returns after it, by four standard errors, than after what it is a
-// multiple of.
+// multiple of, and none after a lag by which every byte returns: nothing is left to explain.
 std::vector<Lag> notable(const std::vector<Lag>& lags, double usual) {
   const double most = std::ranges::max_element(lags, {}, &Lag::share)->share;
   std::vector<Lag> kept;
   for (const Lag& lag : lags)
     if (lag.share - usual >= 0.5 * (most - usual) && std::ranges::none_of(kept, [&](const Lag& k) {
-          return lag.period % k.period == 0 && lag.share < k.share + 4 * lag.sigma;
+          return k.share == 1 || (lag.period % k.period == 0 && lag.share < k.share + 4 * lag.sigma);
         }))
       kept.push_back(lag);
   return kept;

@@ -339,11 +339,6 @@ std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
                    "can say so; let the sensor send frames of one size");
     return std::nullopt;
   }
-  // Of equal bytes every checksum fits every period.
-  if (all.find_first_not_of(all.front()) == std::string::npos) {
-    says.push_back("nothing but the byte " + std::to_string(bytes[0]) + ": a wrong baud rate, or no sensor");
-    return std::nullopt;
-  }
   const std::vector<BinaryReading> found = binary_readings(heard, values);
   if (found.empty() || found[0].bits > found[0].sent - kMostLead) {
     says.push_back("binary without a period: a wrong baud rate, an unknown checksum or type, or no sensor");

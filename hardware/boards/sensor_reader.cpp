@@ -239,12 +239,11 @@ std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, dou
                           const std::function<bool()>& stop) {
   std::vector<Heard> heard;
   std::vector<std::byte> buffer(65536);
-  constexpr std::size_t kEnough = 4 << 20;  // all readings of so many are compared within some seconds
   std::size_t bytes = 0;
   // A machine that stands still listens to nothing: of each wait no more counts than was asked for.
   double now = opened.port->now(), listened = 0;
   try {
-    while (!stop() && listened < seconds && bytes < kEnough) {
+    while (!stop() && listened < seconds && bytes < (16 << 20)) {
       const Received got = opened.port->read(buffer, now + kReadSlice);
       const double before = std::exchange(now, opened.port->now());
       listened += std::min(now - before, kReadSlice);
