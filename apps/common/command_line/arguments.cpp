@@ -169,26 +169,31 @@ std::string Arguments::help() const {
   return text + (positionals_.empty() ? "" : "\n");
 }
 
-/// The command line with the values of options that stand alone.
+/// The command line with the values of options that stand alone. Throws for an option that there is not:
+/// cxxopts takes such a word for a value or a file.
 std::vector<std::string> Arguments::complete_words(int argc, const char* const* argv) const {
   std::vector<std::string> words;
+  bool ended = false;  // by "--"
   for (int i = 0; i < argc; ++i) {
-    words.emplace_back(argv[i]);
-    const auto found =
-        words.back().starts_with("--") ? options_.find(words.back().substr(2)) : options_.end();
-    if (found == options_.end() || found->second.alone.empty()) continue;
+    const std::string word = words.emplace_back(argv[i]);
+    ended = ended || (i > 0 && word == "--");
+    if (i == 0 || ended || !word.starts_with("--")) continue;
+    const std::string name = word.substr(2, word.find('=') - 2);
+    const auto found = options_.find(name);
+    if (found == options_.end() || found->second.is_positional) refuse_option(name);
+    if (found->second.alone.empty() || name.size() + 2 < word.size()) continue;
     if (i + 1 == argc || std::string_view(argv[i + 1]).starts_with("--"))
       words.push_back(found->second.alone);
   }
   return words;
 }
 
-/// Of the command line: nothing takes it.
-void Arguments::refuse_word(const std::string& word) const {
-  if (!word.starts_with("-")) throw UsageError("unexpected argument " + in_quotes(word));
-  const std::string option = word.substr(0, word.find('='));
-  const std::string hint = nearest_name(option.substr(std::min<std::size_t>(2, option.size())), order_);
-  throw UsageError("unknown option " + in_quotes(option) +
+void Arguments::refuse_option(const std::string& name) const {
+  std::vector<std::string> known;
+  for (const auto& [other, option] : options_)
+    if (!option.is_positional) known.push_back(other);
+  const std::string hint = nearest_name(name, known);
+  throw UsageError("unknown option " + in_quotes("--" + name) +
                    (hint.empty() ? "" : "; did you mean '--" + hint + "'?"));
 }
 
@@ -200,7 +205,6 @@ void Arguments::parse(int argc, const char* const* argv) {
     add(parser, "", name, option.help, option.value, option.is_flag, "");
   }
   parser.parse_positional(positionals_);
-  parser.allow_unrecognised_options();  // refuse_word() names them, with a hint
   try {
     const std::vector<std::string> words = complete_words(argc, argv);
     std::vector<const char*> pointers;
@@ -210,7 +214,8 @@ void Arguments::parse(int argc, const char* const* argv) {
       if (result.count(name) == 0) continue;
       values_[name] = options_.at(name).is_flag ? "" : result[name].as<std::string>();
     }
-    if (!result.unmatched().empty()) refuse_word(result.unmatched().front());
+    if (!result.unmatched().empty())
+      throw UsageError("unexpected argument " + in_quotes(result.unmatched().front()));
   } catch (const cxxopts::exceptions::exception& error) {
     throw UsageError(error.what());
   }

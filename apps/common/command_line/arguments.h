@@ -161,7 +161,7 @@ class Arguments {
   Arguments& declare(const std::string& name, Option option);
   std::vector<std::string> complete_words(int argc, const char* const* argv) const;
   void check_given() const;
-  [[noreturn]] void refuse_word(const std::string& word) const;
+  [[noreturn]] void refuse_option(const std::string& name) const;
   [[noreturn]] void reject(const std::string& name, const std::string& expected,
                            const std::string& found) const;
 

@@ -50,6 +50,9 @@ void check_threads(int count) {
     while (std::ssize(threads) + 1 < count) threads.emplace_back([&] { all_are_there.wait(); });
   } catch (const std::system_error& error) {
     problem = error.code().message();
+  } catch (...) {
+    all_are_there.count_down();  // else those that wait would be waited for
+    throw;
   }
   all_are_there.count_down();
   if (problem.empty()) return;
@@ -62,8 +65,8 @@ void check_threads(int count) {
 // By inode, or by name where they do not exist yet.
 bool are_one_file(const std::string& a, const std::string& b) {
   std::error_code error;
-  return fs::equivalent(a, b, error) ||
-         fs::weakly_canonical(fs::absolute(a), error) == fs::weakly_canonical(fs::absolute(b), error);
+  const fs::path one = fs::weakly_canonical(fs::absolute(a), error);
+  return fs::equivalent(a, b, error) || (!one.empty() && one == fs::weakly_canonical(fs::absolute(b), error));
 }
 
 bool is_folder(const std::string& path) {

@@ -1,3 +1,4 @@
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -53,6 +54,10 @@ TEST(Arguments, MistakesAreNamed) {
       {{}, "missing FILE: a file"},
       {{"x", "--cuont", "3"}, "unknown option '--cuont'; did you mean '--count'?"},
       {{"x", "--zzzzzz"}, "unknown option '--zzzzzz'"},
+      {{"x", "--json", "--cuont"}, "unknown option '--cuont'; did you mean '--count'?"},
+      {{"--x"}, "unknown option '--x'"},
+      {{"--FILE", "x"}, "unknown option '--FILE'"},
+      {{"y", "x", "--zzzzzz"}, "unknown option '--zzzzzz'"},
       {{"x", "y"}, "unexpected argument 'y'"},
       {{"x", "--count", "12"}, "--count: expected a whole number from 1 to 9, found '12'"},
       {{"x", "--list", "1,nan"}, "--list: expected numbers from 0 to 9, found 'nan'"},
@@ -96,6 +101,24 @@ TEST(Progress, LineTellsShareRateAndTimeLeft) {
   EXPECT_NE(progress_line("x", 1, 10'000, "steps", 1).find("2:46:39 left"), std::string::npos);
   EXPECT_EQ(progress_line("x", 50, 200, "steps", 5, "epoch 1/4"),
             "x  [##........]  25 %  epoch 1/4  0:30 left");
+}
+
+TEST(TerminalLine, WaitsForNobody) {
+  int ends[2];
+  ASSERT_EQ(socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);
+  const int before = dup(STDERR_FILENO);
+  dup2(ends[0], STDERR_FILENO);
+  {
+    TerminalLine line;
+    line.show("more");
+    while (send(ends[0], "-", 1, MSG_DONTWAIT) == 1) continue;
+    line.show("most");
+  }
+  dup2(before, STDERR_FILENO);
+  char shown[6] = {};
+  recv(ends[1], shown, 5, 0);
+  EXPECT_STREQ(shown, "\rmore");
+  for (const int end : {before, ends[0], ends[1]}) close(end);
 }
 
 // Not to be replaced; what was said of a name that was taken goes to `said`.

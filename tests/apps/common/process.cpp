@@ -87,13 +87,15 @@ void RunningProcess::read_terminal() {
 
 ProcessResult RunningProcess::wait() {
   int status = 0;
-  while (waitpid(child_, &status, terminal_ >= 0 ? WNOHANG : 0) == 0) {
+  rusage usage{};
+  while (wait4(child_, &status, terminal_ >= 0 ? WNOHANG : 0, &usage) == 0) {
     read_terminal();
     usleep(2000);
   }
   child_ = -1;
   if (terminal_ >= 0) read_terminal();
   ProcessResult result;
+  result.kilobytes = usage.ru_maxrss;
   result.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   result.out = read_text_file(folder_.file("out"), 1 << 26);
   result.error = terminal_ >= 0 ? shown_ : read_text_file(folder_.file("error"), 1 << 26);

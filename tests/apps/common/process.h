@@ -14,6 +14,7 @@ namespace supertac {
 struct ProcessResult {
   int code = -1;  ///< exit code, or 128 + signal
   std::string out, error;
+  long kilobytes = 0;  ///< at most held
 };
 
 struct ProcessOptions {
