@@ -89,15 +89,16 @@ void PipeOutput::send(std::string line) {
 }
 
 // The descriptor is shared with other programs and may not be made non-blocking; a pipe that polls ready
-// takes PIPE_BUF bytes.
+// takes PIPE_BUF bytes, a terminal one. Who waits looks at clock and signals between two pieces.
 void PipeOutput::write_waiting(int wait_ms) {
-  constexpr std::size_t kAtOnce = 4096;
+  const std::size_t at_once = terminal_ ? 1 : 4096;
   for (pollfd ready{file_, POLLOUT, 0}; !gone_ && !waiting_.empty() && poll(&ready, 1, wait_ms) > 0;) {
     const std::string_view rest = std::string_view(waiting_.front()).substr(written_);
-    const ssize_t count = ::write(file_, rest.data(), std::min(kAtOnce, rest.size()));
+    const ssize_t count = ::write(file_, rest.data(), std::min(at_once, rest.size()));
     gone_ = count < 0 && errno != EINTR && errno != EAGAIN;
     if (count > 0) written_ += static_cast<std::size_t>(count);
     if (written_ == waiting_.front().size()) waiting_.pop_front(), written_ = 0;
+    if (wait_ms > 0) return;
   }
 }
 

@@ -1,6 +1,8 @@
 // Pictures for other programs, one line of JSON each.
 #pragma once
 
+#include <unistd.h>
+
 #include <cstdint>
 #include <deque>
 #include <string>
@@ -29,20 +31,20 @@ class PipeOutput {
 
   /// Of a descriptor that stays open. `patient`: nothing is lost, send() waits for the reader instead, until
   /// a signal comes: for what was recorded before.
-  PipeOutput(int file, bool patient) : file_(file), patient_(patient) {}
+  PipeOutput(int file, bool patient) : file_(file), patient_(patient), terminal_(isatty(file) == 1) {}
   /// Gives the reader a second to take what waits.
   ~PipeOutput();
   PipeOutput(const PipeOutput&) = delete;
   PipeOutput& operator=(const PipeOutput&) = delete;
   /// Throws std::runtime_error once the reader is gone.
   void send(std::string line);
-  /// Hands over what the pipe has room for, within `wait_ms` for each piece.
+  /// Hands over what the pipe has room for, or with `wait_ms` one piece, once it has within that time.
   void write_waiting(int wait_ms = 0);
   std::uint64_t lost() const { return lost_; }
 
  private:
   int file_;
-  bool patient_, gone_ = false;
+  bool patient_, terminal_, gone_ = false;
   std::deque<std::string> waiting_;
   std::size_t written_ = 0;  // of the first of them
   std::uint64_t lost_ = 0;
