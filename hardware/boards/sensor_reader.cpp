@@ -34,27 +34,30 @@ SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor, const Reader
 void SensorReader::run() {
   double time_s = last_frame_s_;
   try {
-    do time_s = read(port_->now() + kReadSlice);
-    while (!asked_to_stop());
-    // What had arrived when the stop was asked for still counts. Where the machine is busy more comes with
-    // every read: a port holds a tenth of a second at most.
-    double now = port_->now();
-    const double end = now + kReadSlice;
-    for (std::uint64_t before = ~std::uint64_t{0}; live_ && now < end && before != decoder_->counters().bytes;
-         now = port_->now()) {
-      before = decoder_->counters().bytes;
-      time_s = read(now);
+    bool ended = false;
+    try {
+      do time_s = read(port_->now() + kReadSlice);
+      while (!asked_to_stop());
+      // What had arrived when the stop was asked for still counts. Where the machine is busy more comes with
+      // every read: a port holds a tenth of a second at most.
+      double now = port_->now();
+      const double end = now + kReadSlice;
+      for (std::uint64_t before = ~std::uint64_t{0};
+           live_ && now < end && before != decoder_->counters().bytes; now = port_->now()) {
+        before = decoder_->counters().bytes;
+        time_s = read(now);
+      }
+    } catch (const PortEnded&) {  // nothing is wrong, but with one that was to go on
+      ended = true;
     }
-  } catch (const PortEnded&) {  // nothing is wrong, but with one that was to go on
-    // The last line may lack its end.
-    const std::byte end{'\n'};
-    const bool lines = sensor_.frame.kind == FrameKind::text || sensor_.frame.kind == FrameKind::json;
-    decode({&end, lines ? 1U : 0U}, time_s);
-    const std::lock_guard lock(mutex_);
-    if (live_)
-      error_ = std::make_exception_ptr(PortUnplugged("sensor " + sensor_.name + " at " + port_->name() +
-                                                     ": what it sends has ended; see whether its program "
-                                                     "still runs, and start again"));
+    if (ended) {  // the last line may lack its end
+      const std::byte end{'\n'};
+      const bool lines = sensor_.frame.kind == FrameKind::text || sensor_.frame.kind == FrameKind::json;
+      decode({&end, lines ? 1U : 0U}, time_s);
+      if (live_)
+        throw PortUnplugged("sensor " + sensor_.name + " at " + port_->name() +
+                            ": what it sends has ended; see whether its program still runs, and start again");
+    }
   } catch (...) {
     const std::lock_guard lock(mutex_);
     error_ = std::current_exception();

@@ -1,5 +1,5 @@
 // From the journal of a collection to passes with a position for every frame. A pure function of the journal:
-// the same capture gives the same passes, byte for byte, today and on replay.
+// the same capture gives the same passes, byte for byte, whenever it is read.
 #pragma once
 
 #include <cstdint>

@@ -367,7 +367,7 @@ Received ReplayPort::read(std::span<std::byte> buffer, double) {
 }
 
 double ReplayPort::write(std::span<const std::byte>, double) {
-  diverged("is what a sensor sent", "writes to it");
+  throw ReplayDiverged("replay " + name_ + ": a recorded sensor hears nothing that is written to it");
 }
 
 }  // namespace supertac

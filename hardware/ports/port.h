@@ -1,6 +1,6 @@
 // A byte stream with a clock: the only door between the drivers and the world. SerialPort, CapturedPort,
-// ReplayPort and the simulated ports of the virtual rig are all behind it, so that every line of the
-// drivers runs the same on a real rig, on a replay and in simulated time.
+// ReplayPort (of a sensor) and the simulated ports of the tests are all behind it, so that every line of the
+// drivers runs the same on a real rig and in simulated time.
 #pragma once
 
 #include <cstddef>

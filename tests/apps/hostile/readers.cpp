@@ -40,8 +40,9 @@ struct Reader {
   std::function<void(const Bytes&)> read;
 };
 
-Bytes good_journal(const std::string& path) {
-  JournalWriter writer(path, R"({"version":1,"plate":"plain","trial":1,"speed_mm_s":10})");
+/// `header`: what stands in its header besides.
+Bytes good_journal(const std::string& path, const std::string& header = "") {
+  JournalWriter writer(path, R"({"version":1,"plate":"plain","trial":1,"speed_mm_s":10)" + header + "}");
   const Leg leg{1, Phase::slide, {0, 0, 0}, {0, 10, 0}, 10, 1, 2.1};
   writer.event(1, event_text(leg, false));
   for (int i = 0; i < 50; ++i) {
@@ -136,6 +137,10 @@ std::vector<Reader> readers(const std::string& folder) {
     write_frame({}, std::span(frames).subspan(i * rig::kFrameBytes).first<rig::kFrameBytes>());
   return {
       {"journal", good_journal(folder + "/journal"), [](const Bytes& b) { check_journal(b); }},
+      {"sensor's journal",
+       good_journal(folder + "/of_sensor",
+                    ",\"sensor\":" + json_of(Sensor{}).dump() + ",\"bed\":" + json_of(Bed{}).dump()),
+       [](const Bytes& b) { check_journal(b); }},
       {"stl", stl_bytes(mesh_of(Plate::named("plain")), "x"), [](const Bytes& b) { check_stl(b); }},
       {"safetensors", recording, from_file([](const std::string& f) { (void)SafetensorsFile::read(f); })},
       {"recording", recording, from_file([](const std::string& f) { (void)read_recording(f); })},

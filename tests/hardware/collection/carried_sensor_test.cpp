@@ -209,7 +209,8 @@ TEST(CarriedSensor, AReplayThatGoesWrongForDamageSaysSo) {
       "5 bytes of the journal are damaged; supertac-import --journal reads the rest of a collection's";
   EXPECT_ERROR(damaged.read(buffer, 2), JournalError, "damaged: record 0 does not follow");
   EXPECT_EQ(damaged.now(), 1);
-  EXPECT_ERROR(damaged.write(buffer, 2), JournalError, says);
+  EXPECT_ERROR(damaged.read(buffer, 2), JournalError, says);
+  EXPECT_ERROR(damaged.write(buffer, 2), ReplayDiverged, "hears nothing that is written to it");
 }
 
 // A line of two bytes, a frame of 4,096 places of which one has a taxel.

@@ -17,7 +17,7 @@ struct RigFaults {
   double reset_rate = 0;         ///< per line: the firmware restarts
   double action_rate = 0;        ///< per line: the display says //action:cancel or its like
   double pause_rate = 0;         ///< per line: it waits for its user when the move has ended
-  double unplug_rate = 0;        ///< per line: the printer's port goes away
+  double unplug_rate = 0;        ///< per line: the printer's port goes away (in simulated time only)
   double stall_rate =
       0;  ///< per line: the firmware answers 50 ms late; per frame: the board sends 20 ms late
   double freeze_rate = 0;       ///< per line and per frame: 0.3 to 2 s without motion and answers, or frames
