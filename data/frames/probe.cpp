@@ -143,8 +143,9 @@ std::optional<FoundFormat> candidate_of(const std::string& bytes, std::span<cons
   std::vector<std::string> of_text, of_binary;
   bool text = printable > 0.98 * read;
   if (text) found = find_text_format(bytes, seconds, of_text);
-  // Values of bytes may happen to be printable; characters with a NUL beside each are text.
-  if (!found && printable < all && !(text && nul > 0.4 * all)) {
+  // Values of bytes may happen to be printable; lines with a NUL beside each character are text.
+  const bool wide = padded && nul > 0.1 * all && bytes.find_first_of("\r\n") != std::string::npos;
+  if (!found && printable < all && !(text && wide)) {
     const auto binary =
         find_binary_format(heard, known ? std::optional(known->values()) : std::nullopt, of_binary);
     const auto shape = binary ? assumed_array(binary->values) : std::nullopt;

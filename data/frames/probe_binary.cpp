@@ -290,7 +290,6 @@ class Search {
 // Readings of the bytes, the best first, no two of which give the same numbers. Header (0 to 4 bytes),
 // clock, counter, type, byte order, count, checksum and what it covers, and trailer are found at once, by
 // the length of the bytes' description (binary_columns.h).
-std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::optional<std::size_t> values);
 std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::optional<std::size_t> values) {
   std::string all;
   for (const Heard& chunk : heard) all += chunk.bytes;

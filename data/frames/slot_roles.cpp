@@ -128,20 +128,20 @@ int neat(std::size_t n) {
 std::string sum_of_values(const TextGrammar& grammar, std::size_t slot) {
   const auto& stated = grammar.columns[slot];
   if (stated.size() < kFew || !whole(stated) || constant(stated)) return {};
-  int tried = 0;
-  for (std::size_t first = 0; first < slot && tried < 4; ++first) {
-    if (grammar.words[first] || grammar.wall[first]) continue;
-    ++tried;
+  std::vector<std::size_t> numbers;
+  for (std::size_t c = 0; c < slot; ++c)
+    if (!grammar.words[c] && !grammar.wall[c]) numbers.push_back(c);
+  for (std::size_t first = 0; first < std::min<std::size_t>(numbers.size(), 4); ++first)
     for (const double modulus : {0.0, 256.0, 65536.0, 100.0, 1000.0, -1.0}) {
       std::size_t fits = 0;
       for (std::size_t i = 0; i < stated.size(); ++i) {
         double sum = 0;
         std::int64_t crossed = 0;
-        for (std::size_t c = first; c < slot; ++c) {
-          if (grammar.words[c] || !std::isfinite(grammar.columns[c][i])) continue;
-          sum += grammar.columns[c][i];
-          if (std::abs(grammar.columns[c][i]) < 1e15)
-            crossed ^= static_cast<std::int64_t>(grammar.columns[c][i]);
+        for (const std::size_t c : std::span(numbers).subspan(first)) {
+          const double number = grammar.columns[c][i];
+          if (!std::isfinite(number)) continue;
+          sum += number;
+          if (std::abs(number) < 1e15) crossed ^= static_cast<std::int64_t>(number);
         }
         const double made = modulus < 0   ? static_cast<double>(crossed)
                             : modulus > 0 ? sum - modulus * std::floor(sum / modulus)
@@ -150,9 +150,9 @@ std::string sum_of_values(const TextGrammar& grammar, std::size_t slot) {
       }
       if (static_cast<double>(fits) >= 0.9 * static_cast<double>(stated.size()))
         return (modulus < 0 ? "xor" : "sum") + std::string(modulus > 0 ? " modulo " + format(modulus) : "") +
-               " of slots " + std::to_string(first) + " to " + std::to_string(slot - 1) + ", computed again";
+               " of slots " + std::to_string(numbers[first]) + " to " + std::to_string(slot - 1) +
+               ", computed again";
     }
-  }
   return {};
 }
 
