@@ -68,11 +68,11 @@ double nearest_derivative(const Function& f, Variable& leaf, Dim index, double s
   return nearest;
 }
 
-// Of the entries whose numeric gradient is not about 0, which has no ratio.
+// NaN where it is not one; an entry whose numeric gradient alone is 0 has an infinite ratio.
 double ratio_of_wrong(const std::vector<GradientEntry>& entries) {
   double least = std::numeric_limits<double>::infinity(), most = -least;
   for (const GradientEntry& e : entries)
-    if (e.relative_error > kGradientTolerance && std::abs(e.numeric) >= 1e-6)
+    if (e.relative_error > kGradientTolerance && std::abs(e.numeric) + std::abs(e.analytic) >= 1e-6)
       least = std::min(least, e.analytic / e.numeric), most = std::max(most, e.analytic / e.numeric);
   return most - least < 1e-3 ? (most + least) / 2 : std::numeric_limits<double>::quiet_NaN();
 }

@@ -33,8 +33,8 @@ struct GradientReport {
   Dim entries = 0;   // that were compared
   Dim elements = 0;  // of all inputs, from which they are taken evenly
   Dim wrong = 0;     // entries beyond kGradientTolerance
-  /// Analytic through numeric where it is the same for all wrong entries, to a thousandth: -1 is a sign, 2 a
-  /// factor, 0 that no gradient arrives; NaN where they differ, as where a term is missing.
+  /// Analytic through numeric where it is the same for all wrong entries (but of 0 by 0), to a thousandth: -1
+  /// is a sign, 2 a factor, 0 that no gradient arrives; NaN where they differ, as where a term is missing.
   double ratio = std::numeric_limits<double>::quiet_NaN();
   /// How many are wrong, and one line per entry of `worst`, for a failing test to print:
   /// "1 of 72 entries (of 4608 elements) off by more than 1e-06, analytic = -1 numeric in each"

@@ -64,7 +64,7 @@ Variable record(const char* op, Tensor y, std::initializer_list<const Variable*>
 /// "conv2d: x expects rank 4, got [2,3]". The checks below do so; those of shapes check_defined(), too.
 [[noreturn]] void refuse(const std::string& op, const std::string& argument, const std::string& expected,
                          const std::string& got);
-/// Nine digits of a number, for refuse(): two that differ read differently.
+/// Nine digits of a number, for refuse(): two floats that differ read differently.
 std::string digits(double number);
 void check_defined(const char* op, const char* argument, const Variable& x);
 void check_rank(const char* op, const char* argument, const Variable& x, int rank);

@@ -136,9 +136,8 @@ void load_parameters(const SafetensorsFile& file, const std::string& path,
 
 Tensor load_like(const SafetensorsFile& file, const std::string& path, const std::string& name,
                  const Parameter& parameter) {
-  if (std::string problem = mismatch(file, name, parameter); !problem.empty()) {
+  if (std::string problem = mismatch(file, name, parameter); !problem.empty())
     throw std::runtime_error(path + ": " + problem);
-  }
   return to_memory(file.f32(name), parameter);
 }
 

@@ -90,15 +90,16 @@ Variable concat(std::span<const Variable> xs) {
 Variable take_runs(const Variable& x, const Runs& r) {
   check_has_columns("take_runs", "x", x);
   check_no_gradient("take_runs", "x", x);
-  const Dim columns = x.dim(x.rank() - 1);  // no sum or product below is larger than its square
+  const Dim columns = x.dim(x.rank() - 1);
   check_between("take_runs", "first", r.first, 0, columns);
   check_between("take_runs", "run", r.run, 1, std::max<Dim>(columns, 1));
   check_at_least("take_runs", "step", r.step, r.run);
   check_between("take_runs", "width", r.width, r.run, std::max(columns, r.run));
   if (r.width % r.run != 0)
     refuse("take_runs", "width", "a multiple of run, " + std::to_string(r.run), std::to_string(r.width));
-  const Dim end = r.first + (r.width / r.run - 1) * std::min(r.step, columns + 1) + r.run;
-  if (end > columns) refuse("take_runs", "x", std::to_string(end) + " columns or more", x.shape().text());
+  const Dim room = columns - r.first - r.run;  // behind the first run; a product with `step` may overflow
+  if (room < 0 || r.width / r.run - 1 > room / r.step)
+    refuse("take_runs", "x", "columns for all runs", x.shape().text());
   Tensor y(with_last(x.shape(), r.width));
   const Dim rows = x.size() / columns;
   for (Dim at = 0; at < r.width; at += r.run)

@@ -78,7 +78,7 @@ double Adam::step() {
     const Variable& x = parameters_[k];
     if (!x.grad().defined() || x.grad().shape() != x.shape())
       refuse("Adam", "parameter " + std::to_string(k), "a gradient " + x.shape().text(),
-             (x.grad().defined() ? x.grad().shape().text() : "none") + "; run backward() before step()");
+             x.grad().text() + "; run backward() before step()");
   }
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t k = 0; k < parameters_.size(); ++k)

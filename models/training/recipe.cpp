@@ -56,10 +56,9 @@ void Recipe::check() const {
           static_cast<double>(random_plates));
   const PixelInterval interval = interval_factor.value_or(PixelInterval{});
   if (!PixelInterval::read(interval.text()))
-    throw std::invalid_argument(
-        "recipe: expected interval_factor X,Y,Z with X from 0 to 10, Y from 0.05 to 100 and Z from 0 to "
-        "4096, got " +
-        interval.text());
+    throw std::invalid_argument(refusal("recipe", "interval_factor",
+                                        "X,Y,Z with X from 0 to 10, Y from 0.05 to 100 and Z from 0 to 4096",
+                                        interval.text()));
   if (range) require(std::abs(range->span) > 1e-6, "range", "a span that is not 0", range->span);
   if (per_window && model.timesteps == 1)
     throw std::invalid_argument(

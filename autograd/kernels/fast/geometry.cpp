@@ -28,8 +28,8 @@ std::vector<Phase> phases_of(const std::vector<TapPairs>& pairs, bool to_input, 
   const auto pixels = static_cast<std::size_t>(height * width);
   std::vector<std::vector<std::int32_t>> source(pixels, std::vector<std::int32_t>(pairs.size(), -1));
   for (std::size_t t = 0; t < pairs.size(); ++t) {
-    const std::vector<std::int32_t>&to = to_input ? pairs[t].inputs : pairs[t].outputs,
-          &from = to_input ? pairs[t].outputs : pairs[t].inputs;
+    const auto& to = to_input ? pairs[t].inputs : pairs[t].outputs;
+    const auto& from = to_input ? pairs[t].outputs : pairs[t].inputs;
     for (std::size_t i = 0; i < to.size(); ++i) source[static_cast<std::size_t>(to[i])][t] = from[i];
   }
   std::vector<Phase> phases;

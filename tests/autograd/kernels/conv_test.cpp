@@ -76,7 +76,7 @@ void expect_plain_is_fast(const ConvSizes& s) {
   const Tensor x = numbers({s.images, s.in_pixels(), s.cin}), w = numbers({taps, s.cin, s.cout}, 2),
                bias = numbers({s.cout}, 3), gy = numbers({s.images, s.out_pixels(), s.cout}, 4);
   for (const real* b : {bias.data(), static_cast<const real*>(nullptr)}) {
-    for (const real slope : {real(1), real(0.25)}) {
+    for (const real slope : {real(1), real(0.25), real(0)}) {
       expect_plain_is_fast("y", same_order, [&] {
         Tensor y(gy.shape());
         conv(s, x.data(), w.data(), b, slope, y.data());
@@ -137,7 +137,7 @@ TEST(ConvKernels, TheCasesTakeEveryWay) {
 }
 
 TEST(LinearKernels, PlainIsFast) {
-  for (const Dim rows : {1, 7, 300}) {
+  for (const Dim rows : {0, 1, 7, 300}) {
     for (const Dim cin : {1, 5, 33, 130}) {  // 130 x 64 pass in pieces
       for (const Dim cout : {1, 10, 64}) {
         const Tensor x = numbers({rows, cin}), w = numbers({cin, cout}, 2), bias = numbers({cout}, 3);

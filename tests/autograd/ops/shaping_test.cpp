@@ -49,14 +49,14 @@ TEST(Shaping, TakesRunsOfColumns) {
   const Variable x(Tensor::of({2, 6}, {0, 1, 2, 3, 4, 5, 10, 11, 12, 13, 14, 15}));
   const Variable y = take_runs(x, {.first = 1, .run = 2, .step = 3, .width = 4});
   EXPECT_VALUES(y.value(), {2, 4}, {1, 2, 4, 5, 11, 12, 14, 15});
-  EXPECT_REFUSAL("take_runs: x expects 7 columns or more, got [2,6]", take_runs(x, {2, 2, 3, 4}));
+  EXPECT_REFUSAL("take_runs: x expects columns for all runs, got [2,6]", take_runs(x, {2, 2, 3, 4}));
   constexpr Dim kHuge = std::numeric_limits<Dim>::max();
   EXPECT_REFUSAL("take_runs: first expects 0 to 6, got -1", take_runs(x, {-1, 2, 3, 4}));
   EXPECT_REFUSAL("take_runs: first expects 0 to 6, got " + std::to_string(kHuge),
                  take_runs(x, {kHuge, 2, 3, 4}));
   EXPECT_REFUSAL("take_runs: run expects 1 to 6, got 0", take_runs(x, {0, 0, 3, 4}));
   EXPECT_REFUSAL("take_runs: step expects 2 or more, got 1", take_runs(x, {0, 2, 1, 4}));
-  EXPECT_REFUSAL("take_runs: x expects 9 columns or more, got [2,6]", take_runs(x, {0, 2, kHuge, 4}));
+  EXPECT_REFUSAL("take_runs: x expects columns for all runs, got [2,6]", take_runs(x, {0, 2, kHuge, 4}));
   EXPECT_REFUSAL("take_runs: width expects 2 to 6, got " + std::to_string(kHuge - 1),
                  take_runs(x, {0, 2, 2, kHuge - 1}));
   EXPECT_REFUSAL("take_runs: width expects a multiple of run, 2, got 3", take_runs(x, {0, 2, 2, 3}));

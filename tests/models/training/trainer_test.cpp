@@ -94,7 +94,8 @@ class TrainerBytes : public testing::Test {
   TrainerBytes() {
     windows_.recipe.augment = {.gain = 0.5, .noise = 0.02};
     muon_.recipe.muon = true, muon_.recipe.epochs = 1;  // its steps take longer
-    frames_.recipe.model.timesteps = 1, frames_.recipe.per_window = false;
+    frames_.recipe.model.timesteps = 1, frames_.recipe.model.predicted_error = true;
+    frames_.recipe.per_window = false;
     frames_.windows = small_windows(frames_.recipe.model, 40);
   }
   const std::vector<MakeTrainer> makers_ = {[this] { return windows_.trainer(); },

@@ -28,7 +28,8 @@ struct Outputs {
   }
   ALWAYS_INLINE void store(Vec v, real* p, int j) const {
     p += j * Vec::kLanes;
-    kPartial&& j == J - 1 ? v.store_part(p, lanes) : v.store(p);
+    const bool part = kPartial && j == J - 1;
+    part ? v.store_part(p, lanes) : v.store(p);
   }
   Dim lanes;
 };

@@ -118,11 +118,21 @@ ALWAYS_INLINE void transform(Load load, Store store) {
 // A function of transform(), which must not become a call.
 #define INLINED __attribute__((always_inline))
 
-// Calls body(tile, channel, places from there on) for each tile of a job by a vector of channels.
-template <class Places, class Body>
+struct TileCorner {
+  Dim image, row, column;
+};
+template <int kSquare>
+ALWAYS_INLINE TileCorner corner_of(const TileJob& job, Dim tile) {
+  const Dim tiles = job.tiles_down * job.tiles_across, within = tile % tiles;
+  return {tile / tiles, within / job.tiles_across * kSquare, within % job.tiles_across * kSquare};
+}
+
+// Calls body(corner, channel, places from there on) for each tile of a job by a vector of channels.
+template <int kSquare, class Places, class Body>
 ALWAYS_INLINE void for_each_tile(const TileJob& job, Places* places, Body body) {
   for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
-    for (Dim c = 0; c < job.channels; c += Vec::kLanes) body(tile, c, places + c);
+    const TileCorner at = corner_of<kSquare>(job, tile);
+    for (Dim c = 0; c < job.channels; c += Vec::kLanes) body(at, c, places + c);
   }
 }
 
@@ -149,23 +159,13 @@ void filter_grads(const FilterJob& job, const real* u, real* g) {
         });
 }
 
-struct TileCorner {
-  Dim image, row, column;
-};
-template <int kSquare>
-ALWAYS_INLINE TileCorner corner_of(const TileJob& job, Dim tile) {
-  const Dim tiles = job.tiles_down * job.tiles_across, within = tile % tiles;
-  return {tile / tiles, within / job.tiles_across * kSquare, within % job.tiles_across * kSquare};
-}
-
 // Transforms the pixels of each tile and those up to kReach around it, which are 0 beyond the map unless they
 // are there (kThere).
 template <class Transform, int kReach, bool kThere>
 inline void into_places(const TileJob& job, const real* x, real* places) {
   constexpr int kSquare = Transform::kIn - 2 * kReach;
   const Dim height = job.tiles_down * kSquare, width = job.tiles_across * kSquare;
-  for_each_tile(job, places, [&](Dim tile, Dim c, real* to_place) INLINED {
-    const TileCorner at = corner_of<kSquare>(job, tile);
+  for_each_tile<kSquare>(job, places, [&](const TileCorner& at, Dim c, real* to_place) INLINED {
     const real* image = x + at.image * job.map.image + c;
     transform<Transform>(
         [&](int i, int j) INLINED {
@@ -191,8 +191,7 @@ void square_grads(const TileJob& job, const real* gy, real* places) {
 template <class Transform>
 inline void squares_by(const TileJob& job, const real* places, const real* bias, Into into,
                        real negative_slope, real* y) {
-  for_each_tile(job, places, [&](Dim tile, Dim c, const real* place) INLINED {
-    const TileCorner at = corner_of<Transform::kOut>(job, tile);
+  for_each_tile<Transform::kOut>(job, places, [&](const TileCorner& at, Dim c, const real* place) INLINED {
     real* corner = y + at.image * job.map.image + at.row * job.map.line + at.column * job.map.pixel + c;
     const Vec start = Vec::load(bias ? bias + c : kZeros);
     transform<Transform>(
