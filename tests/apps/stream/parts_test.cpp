@@ -3,6 +3,7 @@
 #include "apps/stream/stream.h"
 
 #include <fcntl.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 #include <chrono>
 #include <csignal>
@@ -105,6 +106,21 @@ TEST_F(Pipe, APatientOneLosesNothing) {
   std::string expected;
   for (int i = 0; i < 20'000; ++i) expected += std::to_string(i) + "\n";
   EXPECT_EQ(all, expected);
+}
+
+// Else a steady reader would keep the clock and the signals from being looked at until all is written.
+TEST_F(Pipe, WhoWaitsWritesOnePiece) {
+  PipeOutput output(ends_[1], false);
+  const std::string line(4096, '-');
+  for (int i = 0; i < 40; ++i) output.send(line);
+  int ready = 0;
+  ASSERT_EQ(ioctl(ends_[0], FIONREAD, &ready), 0);
+  ASSERT_GT(ready, 0);
+  std::string taken(static_cast<std::size_t>(ready), ' ');
+  ASSERT_EQ(read(ends_[0], taken.data(), taken.size()), ready);
+  output.write_waiting(1000);
+  ASSERT_EQ(ioctl(ends_[0], FIONREAD, &ready), 0);
+  EXPECT_EQ(ready, 4096);
 }
 
 TEST_F(Pipe, AReaderThatLeavesIsNoticed) {
