@@ -14,7 +14,6 @@ namespace supertac {
 struct ProcessResult {
   int code = -1;  ///< exit code, or 128 + signal
   std::string out, error;
-  long kilobytes = 0;  ///< at most held
 };
 
 struct ProcessOptions {
@@ -23,7 +22,6 @@ struct ProcessOptions {
   long max_file_bytes = -1;  ///< limit on the size of files written; -1: none
   bool terminal = false;     ///< stderr is a terminal of 100 columns
   std::string folder{};      ///< where it runs; empty: where the test does
-  bool nobody = false;       ///< where root starts it, it runs as nobody
 };
 
 /// A program that runs beside the test; killed when the test ends first. `program` is a path or a name in the
