@@ -1,34 +1,32 @@
 // supertac-evaluate: how good a model is on recordings, beside what does without a network.
-#include <cmath>
 #include <optional>
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
 #include "apps/evaluate/exports.h"
-#include "apps/evaluate/map_scores.h"
 #include "apps/evaluate/scoring.h"
 #include "data/recordings/recording.h"
+#include "data/scores/baselines.h"
 #include "data/windows/windows.h"
 #include "io/files/file.h"
 #include "io/numbers/clock.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
+#include "models/inference/evaluation.h"
 
 namespace supertac {
 namespace {
 
 constexpr int kSsimWindow = 7;  // pixels, of pictures below 11
 
-struct Latency {
-  double median_us = 0, p99_us = 0;
-  nlohmann::ordered_json to_json() const { return {{"median_us", median_us}, {"p99_us", p99_us}}; }
-};
+using Json = nlohmann::ordered_json;
 
 // Processor time of calls that make one picture each (batch 1, one thread), warm: what a clock on the wall
 // shows on an idle machine, without the turns that other programs take on a busy one.
-Latency measure_latency(const std::function<void()>& make_picture) {
+Json measure_latency(const std::function<void()>& make_picture) {
   constexpr int kWarmUp = 50, kPictures = 1000;
   for (int n = 0; n < kWarmUp; ++n) make_picture();
   std::vector<double> seconds(kPictures);
@@ -37,7 +35,7 @@ Latency measure_latency(const std::function<void()>& make_picture) {
     make_picture();
     s = seconds_of(CLOCK_THREAD_CPUTIME_ID) - begin;
   }
-  return {.median_us = 1e6 * median(seconds), .p99_us = 1e6 * quantile(seconds, 0.99)};
+  return {{"median_us", 1e6 * median(seconds)}, {"p99_us", 1e6 * quantile(seconds, 0.99)}};
 }
 
 // What is tested, and by which models, is noted for all that is written.
@@ -50,112 +48,81 @@ WindowSet load_windows(const Arguments& a, const ModelFile& file) {
                          progress_of(a, "reading " + a.text("data"), "recordings"));
 }
 
-std::string row(const std::string& name, const ZoneMetrics& metrics, const Latency& latency) {
-  const Metrics c = metrics.contact(), all = metrics.all();
-  const auto number = [](double value, int decimals) {
-    return right_aligned(std::isfinite(value) ? format(value, decimals) : "-", 9);
-  };
-  return left_aligned(name, 12) + number(c.ssim, 3) + number(c.psnr_mean_db, 2) +
-         number(c.position_error_mm, 2) + number(all.ssim, 3) + number(all.psnr_mean_db, 2) +
-         number(latency.median_us, 1);
-}
-
 /// The scores of the network and of every baseline over the same windows.
 struct RecordingScores {
   RecordingScores(const WindowSet& windows, const ModelFile& model, const std::vector<Plate>& kinds,
                   std::size_t methods)
-      : by_group(windows), trust(windows, model), map(windows, model, kinds) {
+      : trust(windows, model), map(windows, model, kinds) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
   std::vector<ZoneMetrics> of_method;
   std::vector<ContactScore> contact;
-  GroupScores by_group;
+  std::map<std::string, ZoneMetrics> by_group;
   TrustScores trust;
   MapScores map;
 };
 
+void score(const Drawn& d, const WindowSet& windows, RecordingScores& scores) {
+  const Zone zone = windows.zone(d.example);
+  const auto level = windows.contact_level();
+  for (std::size_t m = 0; m < d.pictures.size(); ++m)
+    scores.of_method[m].add(d.pictures[m], d.target, zone, level);
+  scores.by_group.try_emplace(group_of(windows.passes()[windows.pass_of(d.example)]), windows.image())
+      .first->second.add(d.pictures[0], d.target, zone, level);
+  scores.map.add(d);
+  const auto one = contact_score(windows, d.example, d.pictures[0], d.target);
+  scores.trust.add(d, one);
+  if (one) scores.contact.push_back(*one);
+}
+
+/// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.
 RecordingScores score_all(const Arguments& a, const Ensemble& network, const ModelFile& file,
                           const WindowSet& windows, const TestSet& tested, const Baselines& baselines,
                           const std::vector<Plate>& kinds, OutputsFile* outputs) {
+  const std::vector<std::uint32_t>& test = tested.split.test;
   RecordingScores scores(windows, file, kinds, 1 + baselines.size());
-  draw_all(a, network, windows, tested.split.test, baselines, [&](const Drawn& d) {
-    const Zone zone = windows.zone(d.example);
-    for (std::size_t m = 0; m < d.pictures.size(); ++m)
-      scores.of_method[m].add(d.pictures[m], d.target, zone, windows.contact_level());
-    scores.by_group.add(d.example, d.pictures[0], d.target);
-    scores.map.add(d);
-    const auto one = contact_score(windows, d.example, d.pictures[0], d.target);
-    scores.trust.add(d, one);
-    if (one) scores.contact.push_back(*one);
-    if (outputs != nullptr) outputs->add(d);
+  std::vector<std::vector<float>> plain(baselines.size(), std::vector<float>(windows.image().pixels()));
+  Progress progress(a, "evaluating", test.size(), "pictures");
+  for_each_output(network, windows, test, [&](const EvaluatedBatch& b) {
+    for (std::size_t n = 0; n < b.size(); ++n) {
+      Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.predicted_error(n), b.input(n)};
+      for (std::size_t k = 0; k < baselines.size(); ++k) {
+        baselines[k]->predict(b.input(n), plain[k]);
+        drawn.pictures.push_back(plain[k]);
+      }
+      score(drawn, windows, scores);
+      if (outputs != nullptr) outputs->add(drawn);
+    }
+    progress.update(b.first + b.size());
+    return !interrupted();
   });
+  stop_if_interrupted();
   scores.map.finish();
   return scores;
 }
 
-/// What was drawn where nothing is, and not drawn where something is.
-std::vector<std::string> silence_lines(const ZoneMetrics& metrics, bool measured) {
-  const std::string where_nothing_is = measured ? "at rest" : "flat";
-  std::vector<std::string> lines;
-  const auto add = [&](const std::string& where, const Metrics& m) {
-    if (m.windows > 0)
-      lines.push_back(where + ": " + format(100 * m.ghost_rate, 2) + " % of " + std::to_string(m.windows) +
-                      " pictures show what is not there, PSNR " + format(m.psnr_mean_db, 1) + " dB");
-  };
-  add(where_nothing_is, metrics.flat());
-  add("air", metrics.air());
-  if (const Metrics edge = metrics.edge(); edge.windows > 0)
-    lines.push_back("at the array's edge: SSIM " + format(edge.ssim, 3) + ", PSNR " +
-                    format(edge.psnr_mean_db, 2) + " dB, " + std::to_string(edge.windows) + " pictures");
-  if (std::isfinite(metrics.contact().miss_rate))
-    lines.push_back("in contact " + format(100 * metrics.contact().miss_rate, 2) +
-                    " % show nothing of what is there");
-  return lines;
-}
-
-nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const WindowSet& windows,
-                              const TestSet& tested, const Baselines& baselines,
-                              const RecordingScores& scores) {
-  const ZoneMetrics& own = scores.of_method.front();
-  nlohmann::ordered_json result = own.to_json();
+Json result_of(const Arguments& a, const Ensemble& network, const WindowSet& windows, const TestSet& tested,
+               const Baselines& baselines, const RecordingScores& scores) {
+  Json result = scores.of_method.front().to_json();
   result["felt"] = scores_by_distance(windows, scores.contact);
-  result["groups"] = scores.by_group.to_json();
+  result["groups"] = scores_by_group(scores.by_group);
   result["trust"] = scores.trust.to_json();
   if (!scores.map.empty()) result["map"] = scores.map.to_json();
-  a.print("split " + tested.split_name + ", seed " + std::to_string(tested.seed) + ", " +
-          std::to_string(own.all().windows) + " windows, " + std::to_string(own.contact().windows) +
-          " in contact");
-  a.print("            |- in contact -------------| |- all ---------| |- one -|");
-  a.print("                 SSIM  PSNR dB   pos mm     SSIM  PSNR dB       us");
   const Tensor window = Tensor::full(network.first().input_shape(1), 0.5F);
   std::vector<float> image(windows.image().pixels());
-  const Latency latency = measure_latency([&] { network.infer(window); });
-  a.print(row("network", own, latency));
-  nlohmann::ordered_json latencies = {{"network", latency.to_json()}};
+  Json latencies = {{"network", measure_latency([&] { network.infer(window); })}};
   for (std::size_t k = 0; k < baselines.size(); ++k) {
     const std::string name = baselines[k]->name();
-    const Latency l = measure_latency([&] { baselines[k]->predict(window.values(), image); });
-    a.print(row(name, scores.of_method[k + 1], l));
-    latencies[name] = l.to_json();
+    latencies[name] = measure_latency([&] { baselines[k]->predict(window.values(), image); });
     result["baselines"][name] = scores.of_method[k + 1].to_json();
   }
-  if (const std::string interval = interval_text(windows, scores.contact); !interval.empty())
-    a.print("95 % intervals of the network's contact windows over passes: " + interval);
   result["over_passes"] = scores_by_pass(windows, scores.contact);
-  for (const std::string& line : silence_lines(own, windows.contact_level().has_value())) a.print(line);
-  for (const std::string& line : scores.by_group.lines()) a.print(line);
-  for (const std::string& line : scores.trust.lines()) a.print(line);
-  for (const std::string& line : scores.map.lines()) a.print(line);
-  if (const auto level = windows.contact_level()) {
-    a.print("contact: a pixel of the measured truth above " + format(*level, 3) + ", from its noise at rest");
-    result["contact_level"] = *level;
-  }
+  if (const auto level = windows.contact_level()) result["contact_level"] = *level;
   result["latency"] = latencies;
   result["model"] = a.text("model");
   result["data"] = windows.fingerprint();
   result["split"] = tested.split_name;
   result["seed"] = tested.seed;
-  for (const std::string& one : remarks_on_scores(result, scores.by_group)) a.note("warning: " + one);
   return result;
 }
 
@@ -163,7 +130,7 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
 std::vector<std::pair<std::string, std::string>> made_by(const Arguments& a, const WindowSet& windows) {
   std::vector<std::pair<std::string, std::string>> lines = {{"command", a.command_line()},
                                                             {"version", version() + ", commit " + commit()}};
-  const nlohmann::ordered_json whole = full_provenance();
+  const Json whole = full_provenance();
   lines.emplace_back("began", whole["began"].get<std::string>() + ", took " +
                                   format(whole["seconds"].get<double>(), 1) + " s");
   for (const auto& [name, hash] : whole["parents"].items()) lines.emplace_back(name, hash.get<std::string>());
@@ -229,7 +196,8 @@ int run(Arguments& a) {
       fit_baselines(windows, tested.split.train, progress_of(a, "fitting the baselines", "parts"));
   const RecordingScores scores = score_all(a, network, files.front(), windows, tested, baselines, kinds,
                                            a.given("outputs") ? &outputs : nullptr);
-  const nlohmann::ordered_json result = report(a, network, windows, tested, baselines, scores);
+  const Json result = result_of(a, network, windows, tested, baselines, scores);
+  print_result(a, result, has_groups(windows));
   if (pictures) write_pictures(network, files.front().interval(), windows, tested.split.test, *pictures);
   if (a.given("outputs")) outputs.write(a.output("outputs"));
   if (a.given("map")) {

@@ -18,27 +18,19 @@
 namespace supertac {
 namespace {
 
-/// The source in words. Throws UsageError when it is not exactly one.
-std::string source_of(const Arguments& a) {
-  std::string source;
-  int sources = 0;
-  for (const char* name : {"sensor", "board", "replay", "recording"}) {
-    if (!a.given(name)) continue;
-    source = std::string(name) + " " + a.text(name);
-    ++sources;
-  }
-  if (sources != 1) {
+/// The option that names the source. Throws UsageError when it is not exactly one, and for what does not go
+/// together.
+std::string source_option(const Arguments& a) {
+  std::vector<std::string> sources = {"sensor", "board", "replay", "recording"};
+  std::erase_if(sources, [&](const std::string& name) { return !a.given(name); });
+  if (sources.size() != 1)
     throw UsageError(
         "expected one of --sensor FILE, --board PORT, --replay JOURNAL and --recording FILE, found " +
-        std::to_string(sources));
-  }
+        std::to_string(sources.size()));
   if (a.text("out") == "-" && a.text("json") == "-") throw UsageError("--out and --json: only one to stdout");
-  if (a.given("plate") && !a.given("record")) throw UsageError("--plate: only with --record");
   if (!is_unknown_plate(a.text("plate"))) read_option("plate", [&] { return Plate::named(a.text("plate")); });
   if (a.given("map")) read_option("map", [&] { return check_map_path(a.text("map")), 0; });
-  if (a.given("elements") && !a.given("map")) throw UsageError("--elements: only with --map");
-  if (a.given("capture") && !a.given("board")) throw UsageError("--capture: only with --board");
-  return source;
+  return sources.front();
 }
 
 std::unique_ptr<SensorSource> open_source(const Arguments& a, double speedup) {
@@ -52,12 +44,10 @@ std::unique_ptr<SensorSource> open_source(const Arguments& a, double speedup) {
 }
 
 /// What the pictures come from; a board at a pseudo-terminal is a virtual rig.
-std::string badge_of(const Arguments& a) {
-  for (const char* name : {"replay", "recording", "sensor"})
-    if (a.given(name)) return name;
+std::string badge_of(const std::string& source, const std::string& named) {
   std::error_code error;
-  const std::string device = std::filesystem::canonical(a.text("board"), error).string();
-  return device.starts_with("/dev/pts/") ? "virtual rig" : "board";
+  const std::string device = std::filesystem::canonical(named, error).string();
+  return source != "board" ? source : device.starts_with("/dev/pts/") ? "virtual rig" : source;
 }
 
 }  // namespace
@@ -84,14 +74,19 @@ void declare(Arguments& a) {
               "keep the surface that was felt, as far as the finger's places are known: .png, .safetensors, "
               ".csv (its elements) or .stl (docs/map.md)")
       .writes()
+      .only_with("map")
       .option("elements", "KIND",
               "where the map shows an element, draw one of this kind: bumps, ridges, blobs, any (the one of "
               "these "
               "that it resembles most), or an STL file of a plate with one element in its middle")
+      .only_with("")
       .option("record", "DIR", "keep the signals as a recording in this folder, the next pass of its plate")
+      .only_with("record")
       .option("plate", "NAME", "what the recording slides over: a plate's name, or an STL file", "unknown")
+      .only_with("board")
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
       .writes()
+      .only_with("")
       .option("precision", "NAME",
               "fp32, or int8: the pictures of a microcontroller (supertac-export --c99), slower", "fp32")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
@@ -101,8 +96,10 @@ void declare(Arguments& a) {
             "--web the array is shown then: press a taxel, and see which one lights up; pressing all of them "
             "in "
             "turn writes the file's order")
+      .only_with("probe")
       .flag("gain",
-            "with --probe: find the gain of each taxel as well, which you press about equally hard (30 s)");
+            "with --probe: find the gain of each taxel as well, which you press about equally hard (30 s)")
+      .only_with("");
   declare_web(a);
 }
 
@@ -163,7 +160,6 @@ std::unique_ptr<SensorSource> open_draft(const Arguments& a, Sensor draft, doubl
 }
 
 int run(Arguments& a) {
-  if (a.flag("gain") && !a.flag("probe")) throw UsageError("--gain: only with --probe");
   std::optional<ProbeReport> probed;
   nlohmann::ordered_json result;
   if (a.flag("probe")) {
@@ -185,11 +181,11 @@ int run(Arguments& a) {
   if (probed)
     settings.found = probed->says, settings.draft = probed->draft, settings.draft_file = a.text("out");
   if (a.given("seconds") && !probed) settings.seconds = a.number("seconds", 0.001, 1e9);
-  const std::string origin = source_of(a);
+  const std::string option = source_option(a), origin = option + " " + a.text(option);
   if (a.given("elements"))
     settings.elements = read_option("elements", [&] { return kinds_of_elements(a.text("elements")); });
   settings.web = web_address(a);
-  settings.badge = badge_of(a), settings.source = origin;
+  settings.badge = badge_of(option, a.text(option)), settings.source = origin;
   const bool drawn = a.given("model");
   settings.metadata = {{"kind", "pictures"}, {"model", a.text("model")}, {"source", origin}};
   std::vector<ModelFile> models;

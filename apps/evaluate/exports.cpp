@@ -10,10 +10,13 @@
 #include "io/files/safetensors.h"
 #include "io/images/images.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 #include "models/inference/evaluation.h"
 
 namespace supertac {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kStrips = 12, kFilmColumns = 24;
 
@@ -125,12 +128,11 @@ std::string name_of(const WindowSet& windows, std::uint32_t window) {
          windows.place_text(window);
 }
 
-nlohmann::ordered_json shown(const std::vector<ContactScore>& chosen, const WindowSet& windows,
-                             const Ensemble& network) {
+Json shown(const std::vector<ContactScore>& chosen, const WindowSet& windows, const Ensemble& network) {
   std::vector<std::uint32_t> which;
   for (const ContactScore& one : chosen) which.push_back(one.window);
   const std::vector<ShownWindow> pictures = draw_again(network, windows, which, {});
-  auto json = nlohmann::ordered_json::array();
+  auto json = Json::array();
   for (std::size_t i = 0; i < chosen.size(); ++i)
     json.push_back({{"name", name_of(windows, which[i])},
                     {"ssim", chosen[i].ssim},
@@ -196,7 +198,7 @@ void write_pictures(const Ensemble& model, const PixelInterval& interval, const 
 }
 
 std::string evaluation_page(const Ensemble& network, const WindowSet& windows,
-                            std::span<const ContactScore> scores, const nlohmann::ordered_json& result,
+                            std::span<const ContactScore> scores, const Json& result,
                             const std::vector<std::pair<std::string, std::string>>& made_by) {
   std::vector<ContactScore> of_groups;
   const std::size_t groups = result["groups"].size();
@@ -215,6 +217,148 @@ std::string evaluation_page(const Ensemble& network, const WindowSet& windows,
                       {"worst_of_groups", shown(of_groups, windows, network)},
                       {"worst", shown(extremes(windows, scores, false), windows, network)},
                       {"best", shown(extremes(windows, scores, true), windows, network)}});
+}
+
+namespace {
+
+// Of a result; NaN or null where there is no figure.
+double number(const Json& value) { return value.is_number() ? value.get<double>() : NAN; }
+std::string figure(const Json& value, int decimals) { return format(number(value), decimals); }
+std::string percent(const Json& share, int decimals = 1) {
+  return format(100 * number(share), decimals) + " %";
+}
+
+std::string row(const std::string& name, const Json& scores, const Json& latency) {
+  std::string line = left_aligned(name, 12);
+  const auto add = [&](const Json& value, int decimals) {
+    line += right_aligned(value.is_number() ? figure(value, decimals) : "-", 9);
+  };
+  const Json &contact = scores["contact"], &all = scores["all"];
+  add(contact["ssim"], 3), add(contact["psnr_mean_db"], 2), add(contact["position_error_mm"], 2);
+  add(all["ssim"], 3), add(all["psnr_mean_db"], 2), add(latency["median_us"], 1);
+  return line;
+}
+
+/// The 95 % intervals of scores_by_pass(); empty where they are not known.
+std::string interval_text(const Json& over_passes) {
+  if (!over_passes.contains("ssim")) return "";
+  const Json &ssim = over_passes["ssim"], &psnr = over_passes["psnr_mean_db"];
+  return "SSIM " + figure(ssim[0], 3) + " to " + figure(ssim[1], 3) + ", PSNR " + figure(psnr[0], 2) +
+         " to " + figure(psnr[1], 2) + " dB";
+}
+
+/// What was drawn where nothing is, and not drawn where something is.
+void print_zones(const Arguments& a, const Json& result) {
+  const char* where_nothing_is = result.contains("contact_level") ? "at rest" : "flat";
+  for (const auto& [zone, name] : {std::pair("flat", where_nothing_is), {"air", "air"}})
+    if (const Json& m = result[zone]; m["windows"] > 0)
+      a.print(std::string(name) + ": " + percent(m["ghost_rate"], 2) + " of " + m["windows"].dump() +
+              " pictures show what is not there, PSNR " + figure(m["psnr_mean_db"], 1) + " dB");
+  if (result.contains("edge"))
+    a.print("at the array's edge: SSIM " + figure(result["edge"]["ssim"], 3) + ", PSNR " +
+            figure(result["edge"]["psnr_mean_db"], 2) + " dB, " + result["edge"]["windows"].dump() +
+            " pictures");
+  if (const Json& missed = result["contact"]["miss_rate"]; missed.is_number())
+    a.print("in contact " + percent(missed, 2) + " show nothing of what is there");
+}
+
+/// The worst groups.
+void print_groups(const Arguments& a, const Json& groups, const std::string& called) {
+  constexpr std::size_t kMost = 8;
+  std::size_t printed = 0;
+  if (groups.size() < 2) return;
+  for (const Json& group : groups) {
+    if (printed == kMost)
+      return a.print("... and " + std::to_string(groups.size() - kMost) + " more, better ones");
+    const Json& contact = group["contact"];
+    if (contact["windows"] == 0) continue;
+    a.print(called + " " + group["name"].get<std::string>() + ": contact SSIM " + figure(contact["ssim"], 3) +
+            ", PSNR " + figure(contact["psnr_mean_db"], 2) + " dB, " + contact["windows"].dump() +
+            " windows");
+    ++printed;
+  }
+}
+
+/// What the network says of its own pictures.
+void print_trust(const Arguments& a, const Json& trust) {
+  if (trust.contains("coverage")) {
+    a.print("intervals hold " + percent(trust["coverage"]) + " of the pixels (interval " +
+            trust["interval"].get<std::string>() + "; " + trust["interval_found"].get<std::string>() +
+            " would hold " + percent(IntervalCoverage::kCovered) + " at each height of the truth)");
+    std::string truths;
+    for (const auto& [truth, held] : trust["coverage_of"].items())
+      truths += (truths.empty() ? "" : ", ") + truth.substr(5) + " " + percent(held["share"]) + " (+-" +
+                figure(held["half_width"], 2) + ")";
+    a.print("intervals hold by height of the truth: " + truths);
+  }
+  if (std::isfinite(number(trust["auroc"])))
+    a.print("predicted errors tell an SSIM below " + format(TrustScores::kBadSsim) + " with an AUROC of " +
+            figure(trust["auroc"], 3));
+  if (trust.contains("unlike_training"))
+    a.print(percent(trust["unlike_training"]) + " of the windows are unlike training");
+}
+
+void print_map(const Arguments& a, const Json& map, bool stated) {
+  const Json &of_pass = map["of_pass"], &of_surface = map["of_surface"];
+  if (!std::isfinite(number(of_pass["ssim"]))) return;  // no window in contact
+  const auto text = [](const Json& scored) {
+    const std::string interval = interval_text(scored["over_passes"]);
+    return "SSIM " + figure(scored["ssim"], 3) + ", PSNR " + figure(scored["psnr_mean_db"], 2) + " dB" +
+           (interval.empty() ? "" : " (95 % over passes: " + interval + ")");
+  };
+  a.print(std::string("in contact, read back from the map of the pass") +
+          (stated ? ", elements drawn as stated: " : ": ") + text(of_pass) +
+          "; from that of all passes: " + text(of_surface));
+  const auto found = [](const Json& e) {
+    return e["found"].dump() + " of " + e["existing"].dump() + ", " + e["false"].dump() + " false";
+  };
+  if (of_surface["elements"]["existing"] > 0)
+    a.print("elements found within " + format(ElementScores::kFoundMm) +
+            " mm: " + found(of_pass["elements"]) + " on maps of passes; " + found(of_surface["elements"]) +
+            " on those of all passes");
+}
+
+// What a reader of the scores should know.
+void warn_of(const Arguments& a, const Json& result, bool grouped) {
+  constexpr double kHardly = 0.02, kCoin = 0.5;
+  constexpr std::size_t kFew = 3;
+  const auto warn = [&](const std::string& remark) { a.note("warning: " + remark); };
+  const double own = number(result["contact"]["ssim"]),
+               ridge = number(result["baselines"]["ridge"]["contact"]["ssim"]);
+  // With split none ridge regression was fitted to what is tested.
+  if (result["split"] != "none" && own < ridge + kHardly)
+    warn("the network's contact SSIM, " + format(own, 3) + ", is hardly above that of ridge regression, " +
+         format(ridge, 3) + ": more or other recordings, or longer training, would have to help");
+  if (const double auroc = number(result["trust"]["auroc"]); auroc < kCoin)
+    warn("predicted errors tell less than a coin which pictures are bad (AUROC " + format(auroc, 3) +
+         "): do not rely on them here");
+  if (const std::size_t count = result["groups"].size(); grouped && count < kFew)
+    warn(std::to_string(count) + (count == 1 ? " group was" : " groups were") +
+         " tested: others may be drawn much better or worse; --split group --leave-out NAME of "
+         "supertac-train tests each in turn");
+}
+
+}  // namespace
+
+void print_result(const Arguments& a, const Json& result, bool grouped) {
+  a.print("split " + result["split"].get<std::string>() + ", seed " + result["seed"].dump() + ", " +
+          result["all"]["windows"].dump() + " windows, " + result["contact"]["windows"].dump() +
+          " in contact");
+  a.print("            |- in contact -------------| |- all ---------| |- one -|");
+  a.print("                 SSIM  PSNR dB   pos mm     SSIM  PSNR dB       us");
+  a.print(row("network", result, result["latency"]["network"]));
+  for (const auto& [name, scores] : result["baselines"].items())
+    a.print(row(name, scores, result["latency"][name]));
+  if (const std::string interval = interval_text(result["over_passes"]); !interval.empty())
+    a.print("95 % intervals of the network's contact windows over passes: " + interval);
+  print_zones(a, result);
+  print_groups(a, result["groups"], grouped ? "group" : "plate");
+  print_trust(a, result["trust"]);
+  if (result.contains("map")) print_map(a, result["map"], a.given("elements"));
+  if (result.contains("contact_level"))
+    a.print("contact: a pixel of the measured truth above " + figure(result["contact_level"], 3) +
+            ", from its noise at rest");
+  warn_of(a, result, grouped);
 }
 
 }  // namespace supertac

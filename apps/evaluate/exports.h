@@ -1,4 +1,4 @@
-// What an evaluation shows besides its tables: pictures, the arrays behind them, and a page.
+// What an evaluation shows: lines, pictures, the arrays behind them, and a page.
 #pragma once
 
 #include <cstdint>
@@ -48,5 +48,10 @@ void write_pictures(const Ensemble& model, const PixelInterval& interval, const 
 std::string evaluation_page(const Ensemble& network, const WindowSet& windows,
                             std::span<const ContactScore> scores, const nlohmann::ordered_json& result,
                             const std::vector<std::pair<std::string, std::string>>& made_by);
+
+/// The table of an evaluation's JSON, a line for whatever else it says, and warnings: that the network is
+/// hardly above ridge regression, that its predicted errors do not tell bad pictures, that few groups were
+/// tested. `grouped`: has_groups().
+void print_result(const Arguments& a, const nlohmann::ordered_json& result, bool grouped);
 
 }  // namespace supertac

@@ -8,12 +8,11 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "apps/common/running/progress.h"
-#include "apps/common/running/signals.h"
+#include "data/plates/truth.h"
 #include "data/scores/statistics.h"
+#include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
-#include "models/inference/evaluation.h"
 #include "models/inference/novelty.h"
 
 namespace supertac {
@@ -60,12 +59,6 @@ struct ScoreSums {
   }
 };
 using PassSums = std::map<std::size_t, ScoreSums>;
-
-PassSums sums_of(const WindowSet& windows, std::span<const ContactScore> scores) {
-  PassSums passes;
-  for (const ContactScore& one : scores) passes[windows.pass_of(one.window)].add(one);
-  return passes;
-}
 
 /// Of SSIM and PSNR.
 std::array<Interval, 2> intervals_of(const WindowSet& windows, const PassSums& passes) {
@@ -127,26 +120,6 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, con
         "the split leaves nothing to fit the baselines on; --split none fits them to what is tested");
 }
 
-void draw_all(const Arguments& a, const Ensemble& network, const WindowSet& windows,
-              std::span<const std::uint32_t> test, const Baselines& baselines,
-              const std::function<void(const Drawn&)>& use) {
-  std::vector<std::vector<float>> plain(baselines.size(), std::vector<float>(windows.image().pixels()));
-  Progress progress(a, "evaluating", test.size(), "pictures");
-  for_each_output(network, windows, test, [&](const EvaluatedBatch& b) {
-    for (std::size_t n = 0; n < b.size(); ++n) {
-      Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.predicted_error(n), b.input(n)};
-      for (std::size_t k = 0; k < baselines.size(); ++k) {
-        baselines[k]->predict(b.input(n), plain[k]);
-        drawn.pictures.push_back(plain[k]);
-      }
-      use(drawn);
-    }
-    progress.update(b.first + b.size());
-    return !interrupted();
-  });
-  stop_if_interrupted();
-}
-
 std::optional<ContactScore> contact_score(const WindowSet& windows, std::uint32_t window,
                                           std::span<const float> picture, std::span<const float> truth) {
   constexpr float kTexture = 0.1F;
@@ -181,7 +154,8 @@ nlohmann::ordered_json scores_by_distance(const WindowSet& windows, std::span<co
 }
 
 nlohmann::ordered_json scores_by_pass(const WindowSet& windows, std::span<const ContactScore> scores) {
-  const PassSums passes = sums_of(windows, scores);
+  PassSums passes;
+  for (const ContactScore& one : scores) passes[windows.pass_of(one.window)].add(one);
   nlohmann::ordered_json json;
   if (passes.size() > 1) {
     const auto [ssim, psnr] = intervals_of(windows, passes);
@@ -196,14 +170,6 @@ nlohmann::ordered_json scores_by_pass(const WindowSet& windows, std::span<const 
   return json;
 }
 
-std::string interval_text(const WindowSet& windows, std::span<const ContactScore> scores) {
-  const PassSums passes = sums_of(windows, scores);
-  if (passes.size() < 2) return "";
-  const auto [ssim, psnr] = intervals_of(windows, passes);
-  return "SSIM " + format(ssim.low, 3) + " to " + format(ssim.high, 3) + ", PSNR " + format(psnr.low, 2) +
-         " to " + format(psnr.high, 2) + " dB";
-}
-
 const std::string& group_of(const WindowSet::Pass& pass) {
   return pass.group.empty() ? pass.plate : pass.group;
 }
@@ -211,71 +177,16 @@ bool has_groups(const WindowSet& windows) {
   return std::ranges::any_of(windows.passes(), [](const auto& pass) { return !pass.group.empty(); });
 }
 
-void GroupScores::add(std::uint32_t window, std::span<const float> picture, std::span<const float> truth) {
-  groups_.try_emplace(group_of(windows_.passes()[windows_.pass_of(window)]), windows_.image())
-      .first->second.add(picture, truth, windows_.zone(window), windows_.contact_level());
-}
-
-std::vector<std::pair<std::string, const ZoneMetrics*>> GroupScores::worst_first() const {
-  std::vector<std::pair<std::string, const ZoneMetrics*>> order;
-  for (const auto& [name, metrics] : groups_) order.emplace_back(name, &metrics);
-  std::ranges::stable_sort(order, {}, [](const auto& group) {
-    const double ssim = group.second->contact().ssim;
-    return std::isfinite(ssim) ? ssim : 2;
+nlohmann::ordered_json scores_by_group(const std::map<std::string, ZoneMetrics>& groups) {
+  nlohmann::ordered_json::array_t rows;
+  for (const auto& [name, metrics] : groups)
+    rows.push_back(
+        {{"name", name}, {"contact", to_json(metrics.contact())}, {"all", to_json(metrics.all())}});
+  std::ranges::stable_sort(rows, {}, [](const auto& row) {
+    const auto& ssim = row["contact"]["ssim"];
+    return ssim.is_number() ? ssim.template get<double>() : 2;
   });
-  return order;
-}
-
-std::vector<std::string> GroupScores::lines() const {
-  constexpr std::size_t kMost = 8;
-  std::vector<std::string> lines;
-  if (groups_.size() < 2) return lines;
-  for (const auto& [name, metrics] : worst_first()) {
-    const Metrics contact = metrics->contact();
-    if (lines.size() == kMost) {
-      lines.push_back("... and " + std::to_string(groups_.size() - kMost) + " more, better ones");
-      break;
-    }
-    if (contact.windows > 0)
-      lines.push_back((by_group() ? "group " : "plate ") + name + ": contact SSIM " +
-                      format(contact.ssim, 3) + ", PSNR " + format(contact.psnr_mean_db, 2) + " dB, " +
-                      std::to_string(contact.windows) + " windows");
-  }
-  return lines;
-}
-
-nlohmann::ordered_json GroupScores::to_json() const {
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  for (const auto& [name, metrics] : worst_first())
-    json.push_back({{"name", name},
-                    {"contact", supertac::to_json(metrics->contact())},
-                    {"all", supertac::to_json(metrics->all())}});
-  return json;
-}
-
-std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result, const GroupScores& groups) {
-  constexpr double kHardly = 0.02, kCoin = 0.5;
-  constexpr std::size_t kFew = 3;
-  std::vector<std::string> remarks;
-  const auto ssim_of = [](const nlohmann::ordered_json& scores) {
-    const auto& ssim = scores["contact"]["ssim"];
-    return ssim.is_number() ? ssim.get<double>() : Metrics::kNone;
-  };
-  const double own = ssim_of(result);
-  // With split none ridge regression was fitted to what is tested.
-  if (result["split"] != "none" && result.contains("baselines") && result["baselines"].contains("ridge"))
-    if (const double ridge = ssim_of(result["baselines"]["ridge"]); own < ridge + kHardly)
-      remarks.push_back("the network's contact SSIM, " + format(own, 3) +
-                        ", is hardly above that of ridge regression, " + format(ridge, 3) +
-                        ": more or other recordings, or longer training, would have to help");
-  if (const auto& auroc = result["trust"]["auroc"]; auroc.is_number() && auroc.get<double>() < kCoin)
-    remarks.push_back("predicted errors tell less than a coin which pictures are bad (AUROC " +
-                      format(auroc.get<double>(), 3) + "): do not rely on them here");
-  if (groups.by_group() && groups.size() < kFew)
-    remarks.push_back(std::to_string(groups.size()) + (groups.size() == 1 ? " group was" : " groups were") +
-                      " tested: others may be drawn much better or worse; --split group --leave-out NAME of "
-                      "supertac-train tests each in turn");
-  return remarks;
+  return rows;
 }
 
 void TrustScores::add(const Drawn& drawn, const std::optional<ContactScore>& contact) {
@@ -301,50 +212,121 @@ double TrustScores::auroc() const {
   return pairs > 0 ? right / pairs : std::nan("");
 }
 
-std::vector<std::pair<std::string, IntervalCoverage::Held>> TrustScores::classes() const {
-  constexpr const char* kHeights[] = {"0", "to 0.2", "to 0.5", "above 0.5"};
-  std::vector<std::pair<std::string, IntervalCoverage::Held>> classes;
-  for (std::size_t h = 0; h < IntervalCoverage::kHeights; ++h)
-    classes.emplace_back(kHeights[h], coverage_.of_height(h));
-  std::erase_if(classes, [](const auto& one) { return one.second.pixels == 0; });
-  return classes;
-}
-
-std::vector<std::string> TrustScores::lines() const {
-  std::vector<std::string> lines;
-  const auto percent = [](double share) { return format(100 * share, 1) + " %"; };
-  if (!coverage_.empty())
-    lines.push_back("intervals hold " + percent(coverage_.share()) + " of the pixels (interval " +
-                    model_.interval().text() + "; " + coverage_.found().text() + " would hold " +
-                    percent(IntervalCoverage::kCovered) + " at each height of the truth)");
-  std::string truths;
-  for (const auto& [name, held] : classes())
-    truths += (truths.empty() ? "" : ", ") + name + " " + percent(held.share) + " (+-" +
-              format(held.half_width, 2) + ")";
-  if (!truths.empty()) lines.push_back("intervals hold by height of the truth: " + truths);
-  if (const double told = auroc(); std::isfinite(told))
-    lines.push_back("predicted errors tell an SSIM below " + format(kBadSsim) + " with an AUROC of " +
-                    format(told, 3));
-  if (judged_ > 0)
-    lines.push_back(percent(static_cast<double>(unlike_) / static_cast<double>(judged_)) +
-                    " of the windows are unlike training");
-  return lines;
-}
-
 nlohmann::ordered_json TrustScores::to_json() const {
-  const auto number = [](double v) { return std::isfinite(v) ? nlohmann::ordered_json(v) : nullptr; };
-  nlohmann::ordered_json json;
+  nlohmann::ordered_json json;  // a NaN is written as null
   if (!coverage_.empty()) {
     json["interval"] = model_.interval().text();
     json["coverage"] = coverage_.share();
     json["interval_found"] = coverage_.found().text();
-    for (const auto& [name, held] : classes())
-      json["coverage_of"]["true " + name] = {
-          {"share", number(held.share)}, {"half_width", number(held.half_width)}, {"pixels", held.pixels}};
+    constexpr const char* kHeights[] = {"true 0", "true to 0.2", "true to 0.5", "true above 0.5"};
+    for (std::size_t h = 0; h < IntervalCoverage::kHeights; ++h)
+      if (const IntervalCoverage::Held held = coverage_.of_height(h); held.pixels > 0)
+        json["coverage_of"][kHeights[h]] = {
+            {"share", held.share}, {"half_width", held.half_width}, {"pixels", held.pixels}};
   }
-  json["auroc"] = number(auroc());
+  json["auroc"] = auroc();
   if (judged_ > 0) json["unlike_training"] = static_cast<double>(unlike_) / static_cast<double>(judged_);
   return json;
+}
+
+MapScores::MapScores(const WindowSet& windows, const ModelFile& model, std::vector<Plate> kinds)
+    : windows_(windows),
+      model_(model),
+      stated_(!kinds.empty()),
+      kinds_(stated_ ? std::move(kinds) : kinds_of_elements(kAnyKind)),
+      by_pass_(windows),
+      by_surface_(windows) {}
+
+std::string MapScores::surface_of(std::size_t pass) const {
+  const WindowSet::Pass& p = windows_.passes()[pass];
+  return p.plate + "_t" + std::to_string(p.trial);
+}
+
+void MapScores::add(const Drawn& drawn) {
+  const auto [x, y] = windows_.position(drawn.example);
+  if (!std::isfinite(x) || !std::isfinite(y) || windows_.zone(drawn.example) == Zone::air) return;
+  const std::size_t pass = windows_.pass_of(drawn.example);
+  const Fused fresh{SurfaceMap(windows_.image(), windows_.frames() > 1), pass};
+  for (Fused* fused : {&of_pass_.try_emplace(pass, fresh).first->second,
+                       &of_surface_.try_emplace(surface_of(pass), fresh).first->second})
+    fused->map.add(x, y, drawn.pictures[0], drawn.predicted_error);
+  added_.push_back(drawn.example);
+}
+
+void MapScores::name(Fused& fused, const std::string& name, Scored& scored) {
+  NamedMap& named = fused.named;
+  named = {.name = name, .cells = fused.map.cells(fused.map.felt()), .cell_mm = fused.map.grid().pixel_mm};
+  model_.interval().half_widths(named.cells.values, named.cells.region.width, named.cells.errors,
+                                named.cells.errors);
+  const Plate& kind = recognise(named, kinds_);
+  if (stated_) fused.stated = plate_of(elements(named), kind);
+  if (windows_.truth_is_measured(fused.pass)) return;
+  for (std::size_t c = 0; c < named.cells.values.size(); ++c) {
+    const auto [x, y] = centre_of(named, c);
+    named.truth.push_back(static_cast<float>(truth_value(windows_.plate(fused.pass), x, y)));
+  }
+  scored.elements.add(named);
+}
+
+void MapScores::score(const Fused& fused, std::uint32_t window, Scored& scored) const {
+  std::vector<float> read(windows_.image().pixels()), truth(read.size());
+  const auto [x, y] = windows_.position(window);
+  windows_.truth(window, truth);
+  stated_ ? truth_image(*fused.stated, x, y, windows_.image(), read) : fused.map.read(x, y, read);
+  scored.zones.add(read, truth, windows_.zone(window));
+  if (const auto one = contact_score(windows_, window, read, truth)) scored.contact.push_back(*one);
+}
+
+void MapScores::finish() {
+  for (auto& [surface, fused] : of_surface_) name(fused, surface, by_surface_);
+  for (auto& [pass, fused] : of_pass_)
+    name(fused, surface_of(pass) + "_p" + std::to_string(windows_.passes()[pass].pass), by_pass_);
+  for (const std::uint32_t window : added_) {
+    const std::size_t pass = windows_.pass_of(window);
+    score(of_pass_.at(pass), window, by_pass_);
+    score(of_surface_.at(surface_of(pass)), window, by_surface_);
+  }
+}
+
+nlohmann::ordered_json MapScores::to_json() const {
+  const auto middle = [](std::vector<double> v) { return v.empty() ? NAN : median(v); };  // NaN becomes null
+  nlohmann::ordered_json json;
+  for (const auto& [name, scored] :
+       {std::pair("of_pass", &by_pass_), std::pair("of_surface", &by_surface_)}) {
+    const Metrics contact = scored->zones.contact();
+    json[name] = {{"ssim", contact.ssim},
+                  {"psnr_mean_db", contact.psnr_mean_db},
+                  {"felt", scores_by_distance(windows_, scored->contact)},
+                  {"over_passes", scores_by_pass(windows_, scored->contact)},
+                  {"elements",
+                   {{"existing", scored->elements.existing},
+                    {"found", scored->elements.found},
+                    {"false", scored->elements.invented},
+                    {"median_mm", middle(scored->elements.distances_mm)},
+                    {"pitch_error_mm", middle(scored->elements.pitch_errors_mm)}}}};
+  }
+  const auto row = [](const NamedMap& map, const std::vector<Element>& found) {
+    return nlohmann::ordered_json{
+        {"kind", map.kind}, {"kind_share", map.kind_share}, {"pitch_mm", pitch_mm(found)}};
+  };
+  for (const auto& [name, fused] : of_surface_) {
+    const std::vector<Element> found = elements(fused.named);
+    auto& surface = json["surfaces"][name] = row(fused.named, found);
+    for (const Element& e : found)
+      for (auto& rows = surface["elements"].emplace_back(); const auto& [key, value] : numbers_of(e))
+        rows[key] = value;
+  }
+  for (const auto& [pass, fused] : of_pass_)
+    json["passes"][fused.named.name] = row(fused.named, elements(fused.named));
+  return json;
+}
+
+std::vector<NamedMap> MapScores::maps(bool passes) const {
+  std::vector<NamedMap> maps;
+  for (const auto& [name, fused] : of_surface_) maps.push_back(fused.named);
+  for (const auto& [pass, fused] : of_pass_)
+    if (passes) maps.push_back(fused.named);
+  return maps;
 }
 
 }  // namespace supertac

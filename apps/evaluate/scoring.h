@@ -1,8 +1,7 @@
-// What is tested, the one loop that draws it, and the tables of its scores.
+// What is tested, and the tables of its scores and of the maps of the surfaces that were felt.
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -11,7 +10,7 @@
 #include <vector>
 
 #include "apps/common/command_line/arguments.h"
-#include "data/scores/baselines.h"
+#include "data/map/named_map.h"
 #include "data/scores/metrics.h"
 #include "data/windows/split.h"
 #include "data/windows/windows.h"
@@ -46,11 +45,6 @@ struct Drawn {
   std::span<const float> input;            ///< as the network takes it
 };
 
-/// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.
-void draw_all(const Arguments& a, const Ensemble& network, const WindowSet& windows,
-              std::span<const std::uint32_t> test, const Baselines& baselines,
-              const std::function<void(const Drawn&)>& use);
-
 // The tables: scores by the distance slid, by pass and by group, and what a network says of its own pictures.
 
 /// How good the picture of a window in contact is.
@@ -76,35 +70,13 @@ nlohmann::ordered_json scores_by_distance(const WindowSet& windows, std::span<co
 /// [{"plate", "trial", "pass", "windows", "ssim", "psnr_mean_db"}, ...]}; without the intervals where fewer
 /// than two passes were in contact.
 nlohmann::ordered_json scores_by_pass(const WindowSet& windows, std::span<const ContactScore> scores);
-/// These intervals as "SSIM 0.81 to 0.84, PSNR 20.1 to 21.0 dB", 95 %; empty where they are not known.
-std::string interval_text(const WindowSet& windows, std::span<const ContactScore> scores);
 
 /// Of a pass; its plate where it has none.
 const std::string& group_of(const WindowSet::Pass& pass);
 bool has_groups(const WindowSet& windows);
 
-/// By group_of() the passes.
-class GroupScores {
- public:
-  explicit GroupScores(const WindowSet& windows) : windows_(windows) {}
-  void add(std::uint32_t window, std::span<const float> picture, std::span<const float> truth);
-  /// A line for each group, those with the lowest contact SSIM first, eight at most; none for a single one.
-  std::vector<std::string> lines() const;
-  /// [{"name", "contact": {...}, "all": {...}}], in the same order.
-  nlohmann::ordered_json to_json() const;
-  bool by_group() const { return has_groups(windows_); }
-  std::size_t size() const { return groups_.size(); }
-
- private:
-  std::vector<std::pair<std::string, const ZoneMetrics*>> worst_first() const;
-
-  const WindowSet& windows_;
-  std::map<std::string, ZoneMetrics> groups_;
-};
-
-/// What a reader of the scores should know: `result` is the evaluation's JSON. That a network is hardly above
-/// ridge regression, that predicted errors do not tell bad pictures, that few groups were tested.
-std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result, const GroupScores& groups);
+/// [{"name", "contact": {...}, "all": {...}}] of groups, those with the lowest contact SSIM first.
+nlohmann::ordered_json scores_by_group(const std::map<std::string, ZoneMetrics>& groups);
 
 /// Whether a network knows when its picture is a guess: what it says of its own pictures against what is
 /// true.
@@ -116,25 +88,73 @@ class TrustScores {
   /// Windows of a pass come in the order of time. Without a predicted error nothing is counted of it.
   void add(const Drawn& drawn, const std::optional<ContactScore>& contact);
 
-  /// For people: nothing for a model that says nothing of its pictures.
-  std::vector<std::string> lines() const;
   /// {"interval", "coverage", "interval_found", "coverage_of": {"true 0": {"share", "half_width", "pixels"},
-  /// "true to 0.2", "true to 0.5", "true above 0.5"}, "auroc", "unlike_training"}
+  /// "true to 0.2", "true to 0.5", "true above 0.5"}, "auroc", "unlike_training"},
+  /// without what a model does not say and without heights that no pixel has.
   nlohmann::ordered_json to_json() const;
 
+  static constexpr double kBadSsim = 0.8;
+
  private:
-  /// By how high the truth is, in words; without those that no pixel belongs to.
-  std::vector<std::pair<std::string, IntervalCoverage::Held>> classes() const;
   /// How often, of a contact window with an SSIM below kBadSsim and one above, the first has the larger mean
   /// predicted error (Hanley, McNeil 1982); NaN without such a pair.
   double auroc() const;
-  static constexpr double kBadSsim = 0.8;
 
   const WindowSet& windows_;
   const ModelFile& model_;
   IntervalCoverage coverage_;
   std::vector<std::pair<double, bool>> told_;  // of contact windows: sum of predicted errors, a bad picture
   std::uint64_t judged_ = 0, unlike_ = 0;
+};
+
+/// Fuses the network's pictures (data/map/surface_map.h), once over each pass and once over all passes of a
+/// plate and trial, and reads each picture back from both. Windows in the air and those whose place is not
+/// known belong to no map.
+class MapScores {
+ public:
+  /// `model`: whose intervals the maps have; both must outlive this. `kinds`: of the elements, where that is
+  /// stated (kinds_of_elements()), else empty: pictures are then read back from what the maps are with
+  /// elements of the kind among these that each resembles most.
+  MapScores(const WindowSet& windows, const ModelFile& model, std::vector<Plate> kinds);
+  /// Windows of a pass come in the order of time.
+  void add(const Drawn& drawn);
+  /// When all have come: names the maps and reads the windows back. Before the rest below.
+  void finish();
+
+  bool empty() const { return added_.empty(); }
+  /// {"of_pass": {"ssim", "psnr_mean_db", "felt": scores_by_distance(), "over_passes":
+  /// scores_by_pass(), "elements": {"existing", "found", "false", "median_mm", "pitch_error_mm"}},
+  /// "of_surface": the same, "surfaces": {PLATE_tTRIAL: {"kind", "kind_share", "pitch_mm", "elements":
+  /// [{"x_mm", "y_mm", ...}]}}, "passes": {PLATE_tTRIAL_pPASS: the same without "elements"}}
+  nlohmann::ordered_json to_json() const;
+  /// As the network has them. PLATE_tTRIAL; with passes PLATE_tTRIAL_pPASS behind them.
+  std::vector<NamedMap> maps(bool passes) const;
+
+ private:
+  struct Fused {
+    SurfaceMap map;
+    std::size_t pass;                                          // one of those that it is made of
+    NamedMap named = {.name = {}, .cells = {}, .cell_mm = 1};  // once all have come
+    std::optional<Plate> stated = {};                          // its elements, where their kind is stated
+  };
+  struct Scored {
+    explicit Scored(const WindowSet& windows) : zones(windows.image()) {}
+    ZoneMetrics zones;
+    std::vector<ContactScore> contact = {};
+    ElementScores elements = {};
+  };
+  std::string surface_of(std::size_t pass) const;
+  void name(Fused& fused, const std::string& name, Scored& scored);
+  void score(const Fused& fused, std::uint32_t window, Scored& scored) const;
+
+  const WindowSet& windows_;
+  const ModelFile& model_;
+  bool stated_;
+  std::vector<Plate> kinds_;  // all that are known, where none is stated
+  std::map<std::size_t, Fused> of_pass_;
+  std::map<std::string, Fused> of_surface_;
+  std::vector<std::uint32_t> added_;
+  Scored by_pass_, by_surface_;
 };
 
 }  // namespace supertac

@@ -6,10 +6,12 @@
 #include <string.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <array>
 #include <atomic>
+#include <ctime>
 #include <filesystem>
+#include <functional>
+#include <numeric>
+#include <utility>
 
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
@@ -18,19 +20,28 @@ namespace supertac {
 namespace {
 
 constexpr std::uint64_t kCheckBytes = 64 << 10, kSpareBytes = 256 << 10;  // of room for the files
-// In the temporary files of all logs, which may lie on one disk and become as large files.
+// For the files of all logs, which may lie on one disk.
 std::atomic<std::uint64_t> waiting_bytes{0};
+
+std::string name_of_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  localtime_r(&now, &local);
+  char text[64];
+  const std::size_t size = std::strftime(text, sizeof text, "recording_%Y%m%d_%H%M%S.safetensors", &local);
+  return {text, size};
+}
 
 }  // namespace
 
 PictureLog::PictureLog(OutputPath output, const PictureFormat& format)
     : output_(std::move(output)), format_(format) {
   refuse_existing(output_.path, !output_.when_taken);
-  times_ = open_spool();
-  signals_ = open_spool();
-  if (format.image.pixels() > 0) pictures_ = open_spool();
-  if (format.half_widths) half_widths_ = open_spool();
-  if (format.distance) distances_ = open_spool();
+  const std::vector<std::uint64_t> picture{static_cast<std::uint64_t>(format.image.height),
+                                           static_cast<std::uint64_t>(format.image.width)};
+  add_column(format.tensor, {format.signals}, &LiveFrame::signals);
+  if (format.image.pixels() > 0) add_column("pictures", picture, &LiveFrame::picture);
+  if (format.half_widths) add_column("half_widths", picture, &LiveFrame::half_widths);
 }
 
 PictureLog::~PictureLog() { waiting_bytes -= bytes_; }
@@ -41,110 +52,164 @@ void PictureLog::fail() {
   throw FileError(output_.path, problem_);
 }
 
-PictureLog::Spool PictureLog::open_spool() {
-  std::string name = (std::filesystem::absolute(output_.path).parent_path() / ".pictures-XXXXXX").string();
-  const int file = mkostemp(name.data(), O_CLOEXEC);
-  if (file < 0) fail();
-  unlink(name.c_str());
-  Spool spool(fdopen(file, "w+b"));
-  if (!spool) fail();
-  return spool;
+void PictureLog::add_column(const char* name, std::vector<std::uint64_t> row,
+                            std::span<const float> LiveFrame::*values) {
+  std::string file = (std::filesystem::absolute(output_.path).parent_path() / ".pictures-XXXXXX").string();
+  const int spool = mkostemp(file.data(), O_CLOEXEC);
+  if (spool < 0) fail();
+  unlink(file.c_str());
+  columns_.push_back({name, std::move(row), values, Spool(fdopen(spool, "w+b"))});
+  if (!columns_.back().spool) fail();
 }
 
-void PictureLog::append(const Spool& spool, std::span<const std::byte> bytes) {
-  if (std::fwrite(bytes.data(), 1, bytes.size(), spool.get()) != bytes.size()) fail();
-  bytes_ += bytes.size(), waiting_bytes += bytes.size();
-}
-
-// A file is as large as the temporary ones, which go only when it is complete.
-void PictureLog::check_room(const LiveFrame& next) {
-  const std::uint64_t row =
-      64 + sizeof(float) * (next.signals.size() + next.picture.size() + next.half_widths.size());
-  if (bytes_ + row < checked_bytes_ + kCheckBytes) return;
-  checked_bytes_ = bytes_ + row;
+// A file is as large as what waits for it, which goes only when it is complete.
+void PictureLog::check_room(std::uint64_t row_bytes) {
+  if (bytes_ + row_bytes < checked_bytes_ + kCheckBytes) return;
+  checked_bytes_ = bytes_ + row_bytes;
   std::error_code error;
   const auto space = std::filesystem::space(std::filesystem::absolute(output_.path).parent_path(), error);
-  if (error || space.available > waiting_bytes + 2 * row + kSpareBytes) return;
-  throw FileError(output_.path, "the disk is nearly full: the " + std::to_string(count_) +
+  if (error || space.available > waiting_bytes + 2 * row_bytes + kSpareBytes) return;
+  throw FileError(output_.path, "the disk is nearly full: the " + std::to_string(times_.size()) +
                                     " frames until here are kept; make room, or choose another folder");
 }
 
 void PictureLog::add(const LiveFrame& seen) {
-  check_room(seen);
-  if (count_ == 0) began_s_ = seen.wall_s - seen.time_s, first_s_ = seen.time_s;
-  append(times_, std::as_bytes(std::span(&seen.time_s, 1)));
-  append(signals_, std::as_bytes(seen.signals));
-  if (pictures_) append(pictures_, std::as_bytes(seen.picture));
-  if (half_widths_) append(half_widths_, std::as_bytes(seen.half_widths));
-  const auto distance = static_cast<float>(seen.distance.value_or(0));
-  if (distances_) append(distances_, std::as_bytes(std::span(&distance, 1)));
-  if (seen.arrival && !pictures_) arrivals_.push_back(*seen.arrival);
-  ++count_;
+  const std::uint64_t row_bytes =
+      64 + sizeof(float) * (seen.signals.size() + seen.picture.size() + seen.half_widths.size());
+  check_room(row_bytes);
+  if (times_.empty()) began_s_ = seen.wall_s - seen.time_s;
+  for (const Column& column : columns_) {
+    const std::span<const float> values = seen.*column.values;
+    if (std::fwrite(values.data(), sizeof(float), values.size(), column.spool.get()) != values.size()) fail();
+  }
+  bytes_ += row_bytes, waiting_bytes += row_bytes;
+  times_.push_back(seen.time_s);
+  if (format_.distance) distances_.push_back(static_cast<float>(seen.distance.value_or(0)));
+  if (seen.arrival && format_.image.pixels() == 0) arrivals_.push_back(*seen.arrival);
 }
 
-// What the board's clock said, now that all frames are known.
-std::vector<double> PictureLog::dated_times() {
+// What the board's clock said, now that all frames are known; `kept` says which have a time. None where there
+// are too few to know the clock by.
+std::vector<double> PictureLog::dated_times(std::vector<bool>& kept) const {
   const FrameTimeline timeline = timeline_of({}, arrivals_);
   std::vector<double> times;
   for (const FrameDate& date : timeline.dates) {
-    kept_.push_back(date.doubt_s() <= kTrustedS);
-    if (kept_.back()) times.push_back(first_s_ + date.time_s - timeline.dates.front().time_s);
+    kept.push_back(date.doubt_s() <= kTrustedS);
+    if (kept.back()) times.push_back(times_.front() + date.time_s - timeline.dates.front().time_s);
   }
-  if (!times.empty()) left_out_ = count_ - times.size();
   return times;
 }
 
-void PictureLog::read_rows(const Spool& spool, std::size_t row_bytes, const ByteSink& sink) {
-  std::vector<std::byte> row;
-  std::size_t number = 0;
-  read_back(spool, [&](std::span<const std::byte> bytes) {
-    for (; !bytes.empty();) {
-      const auto part = bytes.first(std::min(bytes.size(), row_bytes - row.size()));
-      row.insert(row.end(), part.begin(), part.end());
-      bytes = bytes.subspan(part.size());
-      if (row.size() < row_bytes) return;
-      if (kept_[number++]) sink(row);
-      row.clear();
-    }
-  });
-}
-
-void PictureLog::read_back(const Spool& spool, const ByteSink& sink) {
-  if (std::fflush(spool.get()) != 0 || std::fseek(spool.get(), 0, SEEK_SET) != 0) fail();
-  std::array<std::byte, 1 << 16> buffer;
-  while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), spool.get()))
-    sink(std::span(buffer).first(count));
-  if (std::ferror(spool.get()) != 0) fail();
+void PictureLog::read_back(const Column& column, const std::vector<bool>& kept, const ByteSink& sink) {
+  std::FILE* const file = column.spool.get();
+  if (std::fflush(file) != 0 || std::fseek(file, 0, SEEK_SET) != 0) fail();
+  std::vector<float> row(
+      std::accumulate(column.row.begin(), column.row.end(), std::size_t{1}, std::multiplies()));
+  for (const bool wanted : kept) {
+    if (std::fread(row.data(), sizeof(float), row.size(), file) != row.size()) fail();
+    if (wanted) sink(std::as_bytes(std::span(row)));
+  }
 }
 
 void PictureLog::write(std::map<std::string, std::string> metadata) {
   if (!problem_.empty()) throw FileError(output_.path, problem_);
-  if (count_ == 0) return;  // nothing takes no name, and replaces nothing
+  if (empty()) return;  // nothing takes no name, and replaces nothing
   if (!std::isnan(began_s_)) metadata["began_s"] = supertac::format(began_s_);
-  if (arrivals_.size() == count_) {
-    const std::vector<double> times = dated_times();
-    const std::uint64_t kept = count_ - left_out_, row = format_.signals * sizeof(float);
-    if (left_out_ > 0) metadata["left_out_frames"] = std::to_string(left_out_);
+  std::vector<double> times;
+  std::vector<bool> kept;
+  if (arrivals_.size() == times_.size()) {
+    times = dated_times(kept);
     if (times.empty()) metadata["doubt"] = "too short to know the board's clock: dated as the frames came";
-    const auto rows = [&](const ByteSink& sink) { read_rows(signals_, row, sink); };
-    if (!times.empty())
-      return write_safetensors(output_, metadata,
-                               {{"time_s", "F64", {kept}, std::as_bytes(std::span(times)), {}},
-                                {format_.tensor, "F32", {kept, format_.signals}, {}, rows}});
   }
-  const auto from = [this](const Spool& spool) {
-    return [this, &spool](const ByteSink& sink) { read_back(spool, sink); };
-  };
-  const auto height = static_cast<std::uint64_t>(format_.image.height),
-             width = static_cast<std::uint64_t>(format_.image.width);
+  if (times.empty()) times = times_, kept.assign(times_.size(), true);
+  left_out_ = times_.size() - times.size();
+  if (left_out_ > 0) metadata["left_out_frames"] = std::to_string(left_out_);
   std::vector<TensorToWrite> tensors = {
-      {"time_s", "F64", {count_}, {}, from(times_)},
-      {format_.tensor, "F32", {count_, format_.signals}, {}, from(signals_)}};
-  if (pictures_) tensors.push_back({"pictures", "F32", {count_, height, width}, {}, from(pictures_)});
-  if (half_widths_)
-    tensors.push_back({"half_widths", "F32", {count_, height, width}, {}, from(half_widths_)});
-  if (distances_) tensors.push_back({"distances", "F32", {count_}, {}, from(distances_)});
+      {"time_s", "F64", {times.size()}, std::as_bytes(std::span(times)), {}}};
+  for (const Column& column : columns_) {
+    std::vector<std::uint64_t> shape = column.row;
+    shape.insert(shape.begin(), times.size());
+    tensors.push_back(
+        {column.name, "F32", shape, {}, [&](const ByteSink& sink) { read_back(column, kept, sink); }});
+  }
+  if (format_.distance)
+    tensors.push_back({"distances", "F32", {times.size()}, std::as_bytes(std::span(distances_)), {}});
   write_safetensors(output_, metadata, tensors);
+}
+
+std::string Recorder::finish() {
+  stop();
+  std::vector<std::thread> writers;
+  {
+    const std::lock_guard lock(log_mutex_);
+    writers.swap(writers_);
+  }
+  for (std::thread& writer : writers) writer.join();
+  return status().said;
+}
+
+std::string Recorder::start() {
+  const std::string name = name_of_now();
+  try {
+    // Two recordings may begin within a second.
+    const OutputPath output(name, [this](const std::string& line) { taken_ = line; });
+    auto log = std::make_unique<PictureLog>(output, format_);
+    const std::scoped_lock lock(log_mutex_, mutex_);
+    if (log_) return "already recording " + status_.recording;
+    log_ = std::move(log);
+    status_.recording = name;
+    begin_s_ = -1, seconds_ = 0;
+    return "recording " + name;
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+std::string Recorder::stop() {
+  const std::lock_guard lock(log_mutex_);
+  return log_ ? close("") : "nothing is being recorded";
+}
+
+std::string Recorder::close(const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  const std::string name = std::exchange(status_.recording, "");
+  writers_.emplace_back(&Recorder::complete, this, std::move(log_), name, why);
+  return status_.said = "writing " + name;
+}
+
+void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name, const std::string& why) {
+  const std::lock_guard writing(write_mutex_);  // one after the other
+  const std::string recorded = "recorded " + name;
+  std::string said = recorded;
+  taken_.clear();
+  try {
+    log->write(metadata_);
+    if (log->empty()) said = "no frame came: nothing was recorded";
+    if (!taken_.empty()) said = taken_;
+  } catch (const std::exception& error) {
+    said = error.what();
+  }
+  const std::lock_guard lock(mutex_);
+  status_.said = said + (why.empty() || said != recorded ? "" : "; " + why);
+}
+
+void Recorder::add(const LiveFrame& seen) {
+  const std::lock_guard lock(log_mutex_);
+  if (!log_) return;
+  if (begin_s_ < 0) begin_s_ = seen.time_s;
+  seconds_ = seen.time_s - begin_s_;
+  try {
+    log_->add(seen);
+  } catch (const FileError& error) {
+    close(error.what());
+  }
+}
+
+Recorder::Status Recorder::status() {
+  const std::lock_guard lock(mutex_);
+  Status status = status_;
+  status.seconds = seconds_;
+  return status;
 }
 
 }  // namespace supertac

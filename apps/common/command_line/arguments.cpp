@@ -234,8 +234,8 @@ void Arguments::check_given() const {
     if (is_empty && names_path(option.value))
       throw UsageError("--" + name + ": expected " + option.value + ", found an empty name");
     if (is_given && !option.only_with.empty() && !given(option.only_with))
-      throw UsageError("--" + name + ": says something beside --" + option.only_with +
-                       " only, which is not given; leave it out");
+      throw UsageError("--" + name + ": only with --" + option.only_with +
+                       ", which is not given; leave it out");
   }
 }
 

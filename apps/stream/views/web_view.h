@@ -9,7 +9,7 @@
 #include <string>
 
 #include "apps/stream/live_frame.h"
-#include "apps/stream/recorder.h"
+#include "apps/stream/picture_log.h"
 #include "apps/web/web_server.h"
 
 namespace supertac {

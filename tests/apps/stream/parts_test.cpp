@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/stream/pressed_order.h"
-#include "apps/stream/recorder.h"
+#include "apps/stream/picture_log.h"
 #include "apps/stream/views/line_output.h"
 #include "io/files/json.h"
 #include "io/numbers/random.h"
