@@ -81,19 +81,10 @@ class OriginMark {
     const bool found = fs::exists(file_, error);
     return found || error;  // what cannot be looked at may be there
   }
-  /// `why`: how the run ended. On the disk when it returns. Throws FileError
-  void set(const std::string& why = "was cut off") const {
+  /// On the disk when it returns. Throws FileError
+  void set() const {
     make_directories(fs::path(file_).parent_path().string());
-    write_file(file_, "the head's position is unknown until a run on this printer has ended at its origin\n" +
-                          printable(why, 300));
-  }
-  /// That of the run that left it; a mark of before it said why holds its first line alone.
-  std::string why() const {
-    constexpr std::size_t kMost = 4096;
-    const std::string text = read_text_file(file_, kMost);
-    const std::size_t line = text.find('\n');
-    const std::string found = line == std::string::npos ? "" : text.substr(line + 1);
-    return found.empty() ? "was cut off" : printable(found, kMost);
+    write_file(file_, "the head's position is unknown until a run on this printer has ended at its origin\n");
   }
   /// Throws FileError
   void clear() const {
@@ -161,15 +152,6 @@ std::string live_text(const Point3& at, const ReaderCounters& board) {
          " frames/s  " + std::to_string(board.missing) + " lost";
 }
 
-std::string text_of(const std::exception_ptr& error) {
-  try {
-    if (error) std::rethrow_exception(error);
-  } catch (const std::exception& thrown) {
-    return thrown.what();
-  }
-  return "stopped";
-}
-
 /// A run that may move the head: marked until the head is back, or until it turns out that nothing could be
 /// moved.
 RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
@@ -182,7 +164,7 @@ RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> 
   };
   try {
     RecorderReport report = record_palpation(std::move(board), std::move(printer), settings);
-    report.outcome.complete ? mark.clear() : mark.set("ended early (" + text_of(report.outcome.error) + ")");
+    if (report.outcome.complete) mark.clear();
     return report;
   } catch (...) {
     if (!marked_before && !settings.home) mark.clear();
@@ -193,9 +175,9 @@ RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> 
 
 void demand_origin(const Arguments& arguments, const OriginMark& mark, const Point3& origin) {
   if (!mark.is_set() || arguments.flag("home") || arguments.flag("confirm-origin")) return;
-  throw OriginUnknown("collect: the last run on printer " + arguments.text("printer") + " " + mark.why() +
-                      ", so the head's position is unknown; move it to " + describe(origin) +
-                      " and add --confirm-origin, or use --home");
+  throw OriginUnknown("collect: the last run on printer " + arguments.text("printer") +
+                      " did not end at its origin, so the head's position is unknown; move it to " +
+                      describe(origin) + " and add --confirm-origin, or use --home");
 }
 
 /// What the head carries, on the printer's clock.
@@ -279,10 +261,10 @@ RecorderReport collect(const Arguments& arguments, std::unique_ptr<Port> board, 
 }
 
 /// Recordings, quality report and --json of what was collected, complete or not.
-PassesReport keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
+PassesReport keep_passes(const Arguments& arguments, const std::string& journal,
                          const PalpationOutcome& outcome) {
   OutputFolder folder(arguments.output("out"));
-  PassesReport report = write_passes(arguments, journal, out, folder);
+  PassesReport report = write_passes(arguments, journal, folder);
   report.json["passes_done"] = outcome.passes_done;
   report.json["note"] = outcome.note;
   constexpr bool kDespiteSignals = true;
@@ -299,7 +281,12 @@ PassesReport keep_passes(const Arguments& arguments, const std::string& journal,
 /// Where the disk is full, what ended the run would be lost behind what goes wrong with its recordings.
 [[noreturn]] void fail_to_keep(const std::exception& error, const std::string& journal,
                                const PalpationOutcome& outcome) {
-  const std::string why = outcome.error ? text_of(outcome.error) + "; " : "";
+  std::string why;
+  try {
+    if (outcome.error) std::rethrow_exception(outcome.error);
+  } catch (const std::exception& ended) {
+    why = ended.what() + std::string("; ");
+  }
   std::error_code gone;
   throw std::runtime_error(why + error.what() + "; the journal " + journal +
                            (fs::exists(journal, gone)
@@ -332,7 +319,7 @@ int run(Arguments& arguments) {
     arguments.note("incomplete after " + std::to_string(outcome.passes_done) + " passes; " + outcome.note);
   PassesReport report;
   try {
-    report = keep_passes(arguments, settings.journal, out, outcome);
+    report = keep_passes(arguments, settings.journal, outcome);
   } catch (const std::exception& error) {
     fail_to_keep(error, settings.journal, outcome);
   }

@@ -85,9 +85,8 @@ int convert_pairs(const Arguments& arguments, const SafetensorsFile& file) {
 
 int recover(const Arguments& arguments) {
   refuse_others(arguments, "--journal stands alone with --out", {"INPUT", "speed", "skip-bad", "sensor"});
-  const std::string out = arguments.text("out");
   OutputFolder folder(arguments.output("out"));
-  const PassesReport report = write_passes(arguments, arguments.text("journal"), out, folder);
+  const PassesReport report = write_passes(arguments, arguments.text("journal"), folder);
   if (report.undated > 0 && report.frames == 0)
     throw FileError(arguments.text("journal"), report.total() + "; keep it, and collect again");
   if (report.frames == 0)

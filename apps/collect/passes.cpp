@@ -1,5 +1,6 @@
 #include "apps/collect/passes.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "apps/common/output/provenance.h"
@@ -22,28 +23,21 @@ struct Header {
 };
 
 // The header as collection_header() writes it; the plate must be known, since it becomes a file's name.
-Header header_of(const Collection& collection, const std::string& journal) {
+Header header_of(const Journal& journal, const std::string& path) {
   try {
-    const auto json = parse_json_limited(collection.header);
+    const auto json = parse_json_limited(journal.header);
     const Header header{json.at("plate").get<std::string>(), json.at("trial").get<int>(),
                         json.at("speed_mm_s").get<double>()};
-    plate_in_folder(header.plate, fs::path(journal).parent_path().string());
+    plate_in_folder(header.plate, fs::path(path).parent_path().string());
     if (header.trial >= 1 && header.trial <= 1'000'000 && header.speed > 0 && header.speed < 1e6)
       return header;
   } catch (const FileError&) {
     throw;  // of the plate's file
   } catch (const std::exception& error) {
-    throw JournalError(journal + ": its header names no plate, trial and speed (" + error.what() +
+    throw JournalError(path + ": its header names no plate, trial and speed (" + error.what() +
                        "); is it a journal of supertac-collect?");
   }
-  throw JournalError(journal + ": its header has a trial or speed out of range");
-}
-
-/// What is missing from a damaged journal; empty: nothing.
-std::string damage_of(const Collection& collection) {
-  if (collection.lost_bytes == 0) return {};
-  return std::to_string(collection.lost_bytes) + " damaged bytes of the journal, " +
-         format(collection.lost_s, 2) + " s, are missing";
+  throw JournalError(path + ": its header has a trial or speed out of range");
 }
 
 Recording recording_of(const CollectedPass& pass, const Collection& collection, const Header& header,
@@ -76,43 +70,33 @@ Recording recording_of(const CollectedPass& pass, const Collection& collection, 
   return recording;
 }
 
-struct Quality {
-  std::size_t frames = 0, suspect = 0;
-  double seconds = 0, rate_hz = 0;
-};
-
-Quality quality_of(const CollectedPass& pass) {
-  Quality quality{.frames = pass.time_s.size(), .seconds = pass.time_s.back() - pass.time_s.front()};
-  for (const std::uint8_t flag : pass.suspect) quality.suspect += flag;
-  if (quality.seconds > 0) quality.rate_hz = static_cast<double>(quality.frames - 1) / quality.seconds;
-  return quality;
-}
-
-nlohmann::ordered_json to_json(const CollectedPass& pass, const std::string& file) {
-  const Quality quality = quality_of(pass);
+/// Says how good the pass in `file` is, as a line; the same for --json.
+nlohmann::ordered_json report_on(const CollectedPass& pass, const std::string& file, double speed,
+                                 double ordered, const Arguments& arguments) {
+  const std::size_t frames = pass.time_s.size();
+  const double seconds = pass.time_s.back() - pass.time_s.front();
+  const double rate_hz = seconds > 0 ? static_cast<double>(frames - 1) / seconds : 0;
+  const auto suspect = std::ranges::count(pass.suspect, 1);
+  arguments.print("pass " + std::to_string(pass.pass) + ": " + std::to_string(frames) + " frames (" +
+                  format(rate_hz, 1) + "/s), " + std::to_string(pass.missing) + " missing, " +
+                  (pass.left_out > 0 ? std::to_string(pass.left_out) + " left out of uncertain time, " : "") +
+                  std::to_string(suspect) + " suspect, " + std::to_string(pass.positions) + " positions" +
+                  (pass.complete ? "" : ", incomplete") +
+                  (speed != ordered ? ", at " + format(speed) + " mm/s instead of " + format(ordered) : "") +
+                  (pass.doubt.empty() ? "" : ", doubtful: " + pass.doubt));
   return {{"pass", pass.pass},
           {"file", file},
           {"complete", pass.complete},
-          {"seconds", quality.seconds},
-          {"frames", quality.frames},
-          {"frames_per_s", quality.rate_hz},
+          {"seconds", seconds},
+          {"frames", frames},
+          {"frames_per_s", rate_hz},
           {"missing", pass.missing},
           {"left_out", pass.left_out},
-          {"suspect", quality.suspect},
+          {"suspect", suspect},
           {"positions", pass.positions},
           {"rejected_positions", pass.rejected_positions},
-          {"doubt", pass.doubt}};
-}
-
-std::string to_line(const CollectedPass& pass, double speed, double ordered) {
-  const Quality quality = quality_of(pass);
-  return "pass " + std::to_string(pass.pass) + ": " + std::to_string(quality.frames) + " frames (" +
-         format(quality.rate_hz, 1) + "/s), " + std::to_string(pass.missing) + " missing, " +
-         (pass.left_out > 0 ? std::to_string(pass.left_out) + " left out of uncertain time, " : "") +
-         std::to_string(quality.suspect) + " suspect, " + std::to_string(pass.positions) + " positions" +
-         (pass.complete ? "" : ", incomplete") +
-         (speed != ordered ? ", at " + format(speed) + " mm/s instead of " + format(ordered) : "") +
-         (pass.doubt.empty() ? "" : ", doubtful: " + pass.doubt);
+          {"doubt", pass.doubt},
+          {"speed_mm_s", speed}};
 }
 
 }  // namespace
@@ -139,14 +123,16 @@ std::string PassesReport::total(const std::string& became) const {
          (damage.empty() ? "" : "; " + damage);
 }
 
-PassesReport write_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
-                          OutputFolder& folder) {
-  const Collection collection = collection_of(read_journal(journal));
-  const Header header = header_of(collection, journal);
-  PassesReport report{
-      .complete = collection.complete, .resets = collection.resets, .damage = damage_of(collection)};
+PassesReport write_passes(const Arguments& arguments, const std::string& path, OutputFolder& folder) {
+  const Journal journal = read_journal(path);
+  const Collection collection = collection_of(journal);
+  const Header header = header_of(journal, path);
+  PassesReport report{.complete = collection.complete, .resets = collection.clock.resets};
+  if (journal.lost_bytes > 0)
+    report.damage = std::to_string(journal.lost_bytes) + " damaged bytes of the journal, " +
+                    format(journal.lost_s, 2) + " s, are missing";
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
-  add_parent_file("journal", journal);
+  add_parent_file("journal", path);
   for (const CollectedPass& pass : collection.passes) {
     report.left_out += pass.left_out;
     if (pass.time_s.size() < 2) {
@@ -158,27 +144,25 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
     recording.speed_mm_s = named_speed(pass.measured_speed, header.speed);
     if (recording.speed_mm_s != header.speed) recording.metadata["ordered_mm_s"] = format(header.speed);
     write_recording(folder.add(name), recording);
-    arguments.print(to_line(pass, recording.speed_mm_s, header.speed));
-    passes.push_back(to_json(pass, name));
-    passes.back()["speed_mm_s"] = recording.speed_mm_s;
+    passes.push_back(report_on(pass, name, recording.speed_mm_s, header.speed, arguments));
     report.frames += pass.time_s.size();
     report.doubtful += pass.doubt.empty() ? 0 : 1;
   }
   if (Plate::is_file(header.plate))
-    keep_plate_file((fs::path(journal).parent_path() / header.plate).string(), folder.path());
+    keep_plate_file((fs::path(path).parent_path() / header.plate).string(), folder.path());
   const FrameTimeline& clock = collection.clock;
   if (!clock.plausible)
     arguments.note("warning: the board's period is " + format(1e6 * clock.measured_s, 1) + " us, expected " +
                    format(1e6 * rig::kFramePeriodS, 0) + " +- 0.5 %; the nominal one is used");
-  report.json = {{"folder", out},
-                 {"journal", journal},
+  report.json = {{"folder", arguments.text("out")},
+                 {"journal", path},
                  {"plate", header.plate},
                  {"trial", header.trial},
                  {"speed_mm_s", header.speed},
                  {"complete", collection.complete},
-                 {"torn_bytes", collection.torn_bytes},
-                 {"lost_bytes", collection.lost_bytes},
-                 {"lost_s", collection.lost_s},
+                 {"torn_bytes", journal.torn_bytes},
+                 {"lost_bytes", journal.lost_bytes},
+                 {"lost_s", journal.lost_s},
                  {"board_period_us", 1e6 * clock.measured_s},
                  {"board_period_plausible", clock.plausible},
                  {"frames", report.frames},

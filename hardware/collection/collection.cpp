@@ -1,17 +1,17 @@
 #include "hardware/collection/collection.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <optional>
+#include <ranges>
 #include <utility>
 
 #include "data/sensors/rest_tracker.h"
 #include "hardware/ports/errors.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -20,19 +20,15 @@ std::string point_text(const Point3& p) {
   return format(p.x, 4) + " " + format(p.y, 4) + " " + format(p.z, 4);
 }
 
-// The numbers behind an event's first word; nothing when there are not exactly `Count`.
-template <std::size_t Count>
-std::optional<std::array<double, Count>> numbers_of(std::string_view text) {
-  std::array<double, Count> values{};
-  std::size_t at = text.find(' ');
-  for (double& value : values) {
-    if (at == std::string_view::npos) return std::nullopt;
-    const char* last = text.data() + text.size();
-    const auto [end, error] = std::from_chars(text.data() + at + 1, last, value);
-    if (error != std::errc{} || !(std::abs(value) < kLatestTime)) return std::nullopt;
-    at = end == last ? std::string_view::npos : static_cast<std::size_t>(end - text.data());
+/// The numbers behind an event's first word; none where one of them is no number.
+std::vector<double> numbers_of(std::string_view text) {
+  std::vector<double> values;
+  for (const std::string_view word : split_line(text, ' ') | std::views::drop(1)) {
+    const std::optional<double> value = parse_double(word);
+    if (!value || !(std::abs(*value) < kLatestTime)) return {};
+    values.push_back(*value);
   }
-  return at == std::string_view::npos ? std::optional(values) : std::nullopt;
+  return values;
 }
 
 struct RecordedLeg {
@@ -63,12 +59,10 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
   for (const JournalRecord& record : journal.of(JournalStream::event)) {
     const std::string text = record.text();
     if (text == kRunComplete) complete = true;
+    std::vector<double> n = numbers_of(text);
     if (text.starts_with("leg ")) {
-      auto v = numbers_of<13>(text);
-      if (!v) v = numbers_of<13>(text + " 0");  // before they held when the move was sent
-      if (!v) continue;
-      const auto& n = *v;
-      if (n[1] < 1 || n[2] < 0 || n[2] > static_cast<int>(Phase::reposition)) continue;
+      if (n.size() == 12) n.push_back(0);  // before they held when the move was sent
+      if (n.size() != 13 || n[1] < 1 || n[2] < 0 || n[2] > static_cast<int>(Phase::reposition)) continue;
       const Leg leg{static_cast<int>(std::min(n[1], 1e6)),
                     static_cast<Phase>(static_cast<int>(n[2])),
                     {n[3], n[4], n[5]},
@@ -77,15 +71,12 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
                     n[10],
                     n[11],
                     n[12] > 0 ? n[12] : n[10]};
-      if (n[0] == 0) {
-        legs.push_back({leg, false, {}});
-      } else {
+      if (n[0] != 0)
         end_leg(legs, leg);
-      }
-    } else if (text.starts_with("at ") && !legs.empty()) {
-      if (const auto v = numbers_of<5>(text)) {
-        legs.back().samples.push_back({(*v)[0], (*v)[1], {(*v)[2], (*v)[3], (*v)[4]}});
-      }
+      else
+        legs.push_back({leg, false, {}});
+    } else if (text.starts_with("at ") && n.size() == 5 && !legs.empty()) {
+      legs.back().samples.push_back({n[0], n[1], {n[2], n[3], n[4]}});
     }
   }
   return legs;
@@ -96,9 +87,6 @@ struct CollectedFrames {
   std::vector<float> signals;         // n x array.signals(), as Sensor::arrange()
   FrameTimeline clock;                // dates: n, when the sensor had finished each
   std::vector<std::uint8_t> suspect;  // n; 1: may be torn, or an implausible jump
-  SensorDecoder::Counters decoder;
-
-  std::size_t size() const { return clock.dates.size(); }
 };
 
 CollectedFrames frames_in(const Journal& journal, const Sensor& sensor) {
@@ -142,23 +130,14 @@ CollectedFrames frames_in(const Journal& journal, const Sensor& sensor) {
   RestTracker rest(sensor);
   for (std::size_t i = 0; i < arrivals.size(); ++i)
     rest.follow(all.clock.dates[i].time_s, std::span(all.signals).subspan(i * signals, signals));
-  all.decoder = decoder->counters();
   return all;
 }
 
-std::string doubt_of(const FrameTimeline& clock, const PositionTrack& track) {
-  std::string doubt;
-  if (!clock.plausible)
-    doubt = "the board's clock says " + format(1e6 * clock.measured_s, 1) + " us a frame, the nominal " +
-            format(1e6 * rig::kFramePeriodS, 0) + " are used; ";
-  return doubt + track.doubt(kTrustedMm);
-}
-
-CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const PositionTrack& track,
-                      double speed) {
-  CollectedPass pass;
+/// Gives a pass the frames that were made during its track, and says what is doubtful of them.
+void add_frames(CollectedPass& pass, const CollectedFrames& all, std::size_t signals,
+                const PositionTrack& track) {
   std::uint64_t before = 0, last = 0;
-  for (std::size_t i = 0; i < all.size(); ++i) {
+  for (std::size_t i = 0; i < all.clock.dates.size(); ++i) {
     const FrameDate& date = all.clock.dates[i];
     const double time = date.time_s - 0.5 * all.clock.period_s;
     if (time < track.begin() || time > track.end()) continue;
@@ -166,7 +145,7 @@ CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const Pos
     last = date.missing;
     const auto [at_s, p, head_mm] = track.at(time);
     // Where the head alone is doubted by more than that, the pass says so.
-    if (date.doubt_s() * speed + (head_mm > kTrustedMm ? 0 : head_mm) > kTrustedMm) {
+    if (date.doubt_s() * pass.speed + (head_mm > kTrustedMm ? 0 : head_mm) > kTrustedMm) {
       ++pass.left_out;
       continue;
     }
@@ -176,15 +155,15 @@ CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const Pos
     pass.position.insert(pass.position.end(), {p.x, p.y, p.z});
     pass.suspect.push_back(all.suspect[i]);
   }
-  pass.speed = speed;
-  pass.measured_speed = track.speed();
-  pass.doubt = doubt_of(all.clock, track);
   pass.missing = last - before;
+  if (!all.clock.plausible)
+    pass.doubt = "the board's clock says " + format(1e6 * all.clock.measured_s, 1) +
+                 " us a frame, the nominal " + format(1e6 * rig::kFramePeriodS, 0) + " are used; ";
+  pass.doubt += track.doubt(kTrustedMm);
   const std::uint64_t kept = pass.time_s.size(), made = kept + pass.left_out + pass.missing;
   if (static_cast<double>(kept) < 0.75 * static_cast<double>(made))
     pass.doubt += "only " + std::to_string(kept) + " of " + std::to_string(made) + " frames were kept; ";
   pass.doubt.resize(pass.doubt.size() - std::min<std::size_t>(2, pass.doubt.size()));
-  return pass;
 }
 
 // What stands under `key` in the header, by `read`; what it is by default where nothing does.
@@ -227,10 +206,6 @@ Sensor sensor_of(const Journal& journal) { return part_of_header(journal, "senso
 
 Collection collection_of(const Journal& journal) {
   Collection collection;
-  collection.header = journal.header;
-  collection.torn_bytes = journal.torn_bytes;
-  collection.lost_bytes = journal.lost_bytes;
-  collection.lost_s = journal.lost_s;
   const std::vector<RecordedLeg> legs = legs_in(journal, collection.complete);
   collection.sensor = sensor_of(journal);
   collection.bed = part_of_header(journal, "bed", bed_of_json);
@@ -241,35 +216,23 @@ Collection collection_of(const Journal& journal) {
   MoveTiming timing = timing_of(ended);
   for (const auto& [leg, over, samples] : legs)
     if (leg.speed > 0) timing.faster = std::max(timing.faster, fitted_speed(leg, samples) / leg.speed);
-  collection.decoder = all.decoder;
-  collection.frames = all.size();
-  collection.missing = all.clock.missing;
-  collection.resets = all.clock.resets;
-  struct Parts {
-    PositionTrack track;
-    double speed = 0;
-    bool complete = false;
-    std::uint64_t positions = 0;
-  };
-  std::map<int, Parts> parts;
-  for (const RecordedLeg& recorded : legs) {
-    const Phase phase = recorded.leg.phase;
-    if (phase != Phase::onset && phase != Phase::slide && phase != Phase::release) continue;
-    Parts& part = parts[recorded.leg.pass];
-    part.track.add_leg(recorded.leg, recorded.samples, timing);
-    part.positions += recorded.samples.size();
-    if (phase == Phase::slide) part.speed = recorded.leg.speed;
-    if (phase == Phase::release) part.complete = recorded.ended;
+  std::map<int, std::pair<CollectedPass, PositionTrack>> passes;
+  for (const auto& [leg, over, samples] : legs) {
+    if (leg.phase != Phase::onset && leg.phase != Phase::slide && leg.phase != Phase::release) continue;
+    auto& [pass, track] = passes[leg.pass];
+    track.add_leg(leg, samples, timing);
+    pass.positions += samples.size();
+    if (leg.phase == Phase::slide) pass.speed = leg.speed;
+    if (leg.phase == Phase::release) pass.complete = over;
   }
-  for (const auto& [number, part] : parts) {
-    CollectedPass pass = pass_of(all, collection.sensor.array.signals(), part.track, part.speed);
+  for (auto& [number, both] : passes) {
+    auto& [pass, track] = both;
     pass.pass = number;
-    pass.complete = part.complete;
-    pass.positions = part.positions;
-    pass.rejected_positions = part.track.rejected();
+    pass.measured_speed = track.speed();
+    pass.rejected_positions = track.rejected();
+    add_frames(pass, all, collection.sensor.array.signals(), track);
     collection.passes.push_back(std::move(pass));
   }
-  all.clock.dates.clear();
   collection.clock = std::move(all.clock);
   return collection;
 }

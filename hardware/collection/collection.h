@@ -102,16 +102,10 @@ double named_speed(double measured, double ordered);
 constexpr double kTrustedMm = 0.3;
 
 struct Collection {
-  std::string header;
-  Sensor sensor;  ///< as the header says; the rig's where it says nothing
+  Sensor sensor;  ///< as the journal's header says; the rig's where it says nothing
   Bed bed;
   bool complete = false;
-  std::uint64_t torn_bytes = 0;  ///< of the journal's end
-  std::uint64_t lost_bytes = 0;  ///< of the journal, damaged
-  double lost_s = 0;
-  SensorDecoder::Counters decoder;
-  std::uint64_t frames = 0, missing = 0, resets = 0;
-  FrameTimeline clock;  ///< without its dates
+  FrameTimeline clock;  ///< of all frames, those between the passes too
   std::vector<CollectedPass> passes;
 };
 

@@ -44,15 +44,27 @@ void hear_board(SensorReader& board, Printer& printer, const RecorderSettings& s
   for (int i = 0; i < 100 && !board.next(0.02); ++i) check_stop(settings, journal);  // throws what ended it
 }
 
-RecorderReport record(SensorReader& board, Printer& printer, const RecorderSettings& settings,
-                      JournalWriter& journal) {
-  hear_board(board, printer, settings, journal);
+RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> printer_port,
+                      const RecorderSettings& settings, JournalWriter& journal) {
+  CapturedPort captured(std::move(printer_port), journal, JournalStream::printer);
+  Printer printer(captured, settings.bed.limits);
+  printer.link().set_watch([&] { check_stop(settings, journal); });
+  printer.link().give_up_at(captured.now() + longest_run_s(settings));
   RecorderReport report;
-  report.outcome = Palpation(printer, settings.bed.plan, observer_for(settings, journal, board)).run();
-  report.kept = printer.put_back();
-  board.stop();
+  try {
+    printer.connect();
+    settings.home ? printer.home() : printer.confirm_origin(settings.bed.origin);
+    auto port = std::make_unique<CapturedPort>(std::move(board_port), journal, JournalStream::board);
+    SensorReader board({.port = std::move(port)}, settings.sensor, settings.reader);
+    hear_board(board, printer, settings, journal);
+    report.outcome = Palpation(printer, settings.bed.plan, observer_for(settings, journal, board)).run();
+    report.kept = printer.put_back();
+  } catch (...) {
+    printer.put_back();
+    throw;
+  }
   report.printer = printer.link().counters();
-  if (report.outcome.complete) journal.event(printer.link().port().now(), kRunComplete);
+  if (report.outcome.complete) journal.event(captured.now(), kRunComplete);
   try {
     journal.close();
   } catch (const JournalError&) {
@@ -60,24 +72,6 @@ RecorderReport record(SensorReader& board, Printer& printer, const RecorderSetti
     if (!report.outcome.error) report.outcome.error = std::current_exception();
   }
   return report;
-}
-
-RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> printer_port,
-                      const RecorderSettings& settings, JournalWriter& journal) {
-  CapturedPort captured(std::move(printer_port), journal, JournalStream::printer);
-  Printer printer(captured, settings.bed.limits);
-  printer.link().set_watch([&] { check_stop(settings, journal); });
-  printer.link().give_up_at(captured.now() + longest_run_s(settings));
-  try {
-    printer.connect();
-    settings.home ? printer.home() : printer.confirm_origin(settings.bed.origin);
-    auto port = std::make_unique<CapturedPort>(std::move(board_port), journal, JournalStream::board);
-    SensorReader board({.port = std::move(port)}, settings.sensor, settings.reader);
-    return record(board, printer, settings, journal);
-  } catch (...) {
-    printer.put_back();
-    throw;
-  }
 }
 
 }  // namespace

@@ -64,7 +64,7 @@ std::string check_frames(const Journal& journal, const NumberedBoard& board, con
   }
   if (numbers.empty()) return "no frames";
   const std::uint64_t made = numbers.back() - numbers.front() + 1;
-  const std::uint64_t told = collection.frames + collection.missing;
+  const std::uint64_t told = collection.clock.dates.size() + collection.clock.missing;
   constexpr std::uint64_t kLastReads = 3;
   if (told <= made && made <= told + kLastReads) return {};
   return "the board made " + std::to_string(made) + " frames, " + std::to_string(told) + " are accounted for";
@@ -248,7 +248,7 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
     }
     const Journal journal = read_journal(settings.journal);
     const Collection collection = collection_of(journal);
-    verdict.missing = collection.missing;
+    verdict.missing = collection.clock.missing;
     judge_passes(collection, board, plan, verdict);
     // A damaged move that passed as right goes elsewhere, and nobody can know.
     if (verdict.altered.empty() && verdict.broken.empty())

@@ -206,7 +206,7 @@ TEST(CollectProgram, TheBarOfAFaultlessRigCountsNoDroppedPicturesAsLost) {
   // Of those that a busy machine let its terminal lose, the bar knows no more than the journal.
   const Collection whole = collection_of(read_journal(run.journal()));
   EXPECT_LT(std::stod(result.error.substr(begin, end - begin)),
-            static_cast<double>(whole.missing) + 0.1 * static_cast<double>(whole.frames));
+            static_cast<double>(whole.clock.missing) + 0.1 * static_cast<double>(whole.clock.dates.size()));
 }
 
 // Nothing moves, nothing is left behind, and one line says what is wrong and what to do.
