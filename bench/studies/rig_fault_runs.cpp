@@ -1,47 +1,11 @@
 // rig_fault_runs [RUNS [FIRST_SEED]]: seeded collections on the virtual rig in simulated time, as DrawnRun
 // draws them, one line of CSV each. Every recording is within 0.3 mm of the truth by frame number and named
-// by its speed within 1 %, or says that it is not; no head leaves the plan's box. Then twelve programs of 60
-// moves a firmware with 0.2 % of the bytes damaged. Exit code 1 when a promise is broken.
+// by its speed within 1 %, or says that it is not; no head leaves the plan's box. Exit code 1 when a promise
+// is broken.
 #include <cstdlib>
 #include <iostream>
 
 #include "tests/hardware/fault_run.h"
-#include "tests/hardware/rig_support.h"
-
-namespace supertac {
-namespace {
-
-/// 60 moves that must run once, in order, and end at X = 30.
-bool program_ends_right(std::uint64_t seed, Firmware firmware) {
-  RigSettings rig = running_rig({.firmware = firmware}, {.byte_rate = 0.002});
-  rig.seed = seed;
-  SimulatedRig simulated(rig);
-  const auto port = simulated.printer_port();
-  std::vector<std::string> moves;
-  try {
-    MarlinLink link(*port);
-    link.connect();
-    link.command("G92 X0 Y0 Z0");
-    for (int i = 1; i <= 60; ++i) {
-      moves.push_back("G1 X" + std::to_string(i == 60 ? 30 : i % 7) + " F3000");
-      link.command(moves.back());
-    }
-    link.command("M400", 60);
-  } catch (const HardwareError& error) {
-    std::cerr << "program, seed " << seed << ": " << error.what() << '\n';
-  }
-  return moves.size() == 60 && moves_of(simulated.world().printer()) == moves;
-}
-
-int programs_that_end_right() {
-  int right = 0;
-  for (const Firmware firmware : {Firmware::marlin, Firmware::marlin_before_2_1_2})
-    for (std::uint64_t seed = 1; seed <= 12; ++seed) right += program_ends_right(seed, firmware) ? 1 : 0;
-  return right;
-}
-
-}  // namespace
-}  // namespace supertac
 
 int main(int argc, char** argv) {
   using namespace supertac;
@@ -71,9 +35,7 @@ int main(int argc, char** argv) {
               << verdict.worst_mm << ',' << verdict.worst_trusted_mm << ",\"" << verdict.doubt << "\",\""
               << verdict.error << "\",\"" << verdict.broken << '"' << std::endl;
   }
-  const int programs = programs_that_end_right();
   std::cerr << runs << " runs: " << complete << " complete, " << flagged << " flagged; the rest within "
-            << worst << " mm; " << broken << " broken promises; " << programs
-            << " of 24 programs of 60 moves\n";
-  return broken == 0 && programs == 24 ? 0 : 1;
+            << worst << " mm; " << broken << " broken promises\n";
+  return broken == 0 ? 0 : 1;
 }

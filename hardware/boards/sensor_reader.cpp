@@ -16,13 +16,17 @@ constexpr std::size_t kShown = 120;
 
 bool is_rig(const Sensor& sensor) { return sensor.frame.kind == FrameKind::board; }
 
+double usual_silence_s(const Sensor& sensor) {
+  return is_rig(sensor) ? 1 : std::max(3.0, 10 / sensor.rate_hz);
+}
+
 }  // namespace
 
 SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor, const ReaderSettings& settings)
     : port_(std::move(opened.port)),
       live_(opened.live),
       sensor_(sensor),
-      silence_s_(settings.silence_s > 0 ? settings.silence_s : silence_s(sensor)),
+      silence_s_(settings.silence_s > 0 ? settings.silence_s : usual_silence_s(sensor)),
       decoder_(make_decoder(sensor)),
       clock_(clock_settings(sensor, opened.stored)),
       rest_(sensor),
@@ -75,8 +79,6 @@ double SensorReader::read(double until) {
   const auto bytes = std::span(buffer).first(got.count);
   for (const std::byte byte : bytes.first(std::min(bytes.size(), kShown - without_frame_.size())))
     without_frame_ += std::to_integer<char>(byte);
-  if (decoder_->counters().frames == 0)
-    for (const std::byte byte : bytes) text_bytes_ += is_text(byte) ? 1 : 0;
   decode(bytes, got.time_s);
   check_silence(got.time_s);
   return got.time_s;
@@ -175,41 +177,29 @@ bool SensorReader::ended() const {
   return ended_ && queue_.empty() && !error_;
 }
 
-double SensorReader::silence_s(const Sensor& sensor) {
-  return is_rig(sensor) ? 1 : std::max(3.0, 10 / sensor.rate_hz);
-}
-
 void SensorReader::check_silence(double time_s) {
   const SensorDecoder::Counters total = decoder_->counters();
   if (total.frames != decoded_.frames) last_frame_s_ = time_s, decoded_ = total;
   if (!live_ || time_s - last_frame_s_ < silence_s_) return;
   const std::uint64_t bytes = total.bytes - decoded_.bytes;
-  const bool never = total.frames == 0;
-  const std::string none =
-      format(sensor_.rate_hz, 0) + " frames/s, found none for " + format(silence_s_, 1) + " s";
-  if (is_rig(sensor_)) {
-    if (never && bytes >= 2)
-      throw WrongDevice(
-          "port " + port_->name() + ": expected a tactile board, found " +
-          (text_bytes_ > 0.9 * static_cast<double>(total.bytes)
-               ? "text, as from a printer; exchange the two ports"
-               : std::to_string(bytes) +
-                     " bytes without a frame; choose the board's port (supertac-check machine)"));
-    throw BoardSilent("board " + port_->name() + ": expected " + none + "; " +
-                      (never ? "is this the board's port (supertac-check machine)? If it is, " : "") +
-                      "plug the board out and in again");
-  }
-  const std::string at = "sensor " + sensor_.name + " at " + port_->name() + ": expected ";
+  const bool rig = is_rig(sensor_), never = total.frames == 0;
+  const std::string at = (rig ? "board " : "sensor " + sensor_.name + " at ") + port_->name() + ": expected ";
   const std::string such = ", such as '" + printable(without_frame_, kShown) + "'; ";
-  if (never && bytes > 0)
-    throw WrongDevice(at + "frames of " + std::to_string(sensor_.values()) + " values, found " +
-                      std::to_string(bytes) + " bytes without one" + such +
-                      "supertac-stream --probe says what they are");
-  throw BoardSilent(at + none +
-                    (bytes > 0 ? " in " + std::to_string(bytes) + " bytes" + such +
-                                     "see whether it was switched off or now sends something else "
-                                     "(supertac-stream --probe)"
-                               : "; see whether it is switched on and sends to this port"));
+  if (never && bytes > 1)
+    throw WrongDevice(
+        at + "frames of " + std::to_string(sensor_.values()) + " values, found " + std::to_string(bytes) +
+        " bytes without one" + such +
+        (rig ? "choose the board's port (supertac-check machine), or exchange it and the printer's"
+             : "supertac-stream --probe says what they are"));
+  std::string found =
+      format(sensor_.rate_hz, 0) + " frames/s, found none for " + format(silence_s_, 1) + " s";
+  found += bytes > 0 ? " in " + std::to_string(bytes) + " bytes" + such : "; ";
+  if (rig && never) found += "is this the board's port (supertac-check machine)? If it is, ";
+  throw BoardSilent(at + found +
+                    (rig         ? "plug the board out and in again"
+                     : bytes > 0 ? "see whether it was switched off or now sends something else "
+                                   "(supertac-stream --probe)"
+                                 : "see whether it is switched on and sends to this port"));
 }
 
 // Right after the start: a clock in another unit than the file says is a thousand times too fast or too slow.

@@ -44,16 +44,14 @@ struct ReaderCounters {
 
 struct ReaderSettings {
   std::size_t queue_frames = 4096;
-  double silence_s = 0;  ///< without a frame for so long: BoardSilent; 0: SensorReader::silence_s()
+  double silence_s =
+      0;  ///< without a frame for so long: BoardSilent; 0: 3 s and ten frames, the rig's board 1 s
 };
 
 /// Reads one sensor by a thread of its own. What ends it is PortUnplugged, BoardSilent or WrongDevice, the
 /// last also where a clock has another unit than the file says.
 class SensorReader {
  public:
-  /// How long a live sensor may say nothing (s).
-  static double silence_s(const Sensor& sensor);
-
   /// Starts to read. A full queue drops the oldest frame; from a port that is not live it waits instead.
   SensorReader(OpenedPort opened, const Sensor& sensor, const ReaderSettings& settings = {});
   /// Stops reading; frames that already arrived at the port are still read.
@@ -71,6 +69,8 @@ class SensorReader {
   /// The source is at its end and all frames have been taken.
   bool ended() const;
   bool live() const { return live_; }
+  /// How long a live sensor may say nothing (s).
+  double silence_s() const { return silence_s_; }
   ReaderCounters counters();
 
  private:
@@ -98,7 +98,6 @@ class SensorReader {
   ReaderCounters read_;                   // without what the decoder and the clock count
   std::optional<double> last_arrival_s_;  // of a frame that was handed over
   std::uint32_t skipped_ = 0;             // frames since then that were not
-  double text_bytes_ = 0;                 // of those before the first frame
   std::string without_frame_;             // the first bytes of what came behind the newest frame
   double last_frame_s_;
   SensorDecoder::Counters decoded_;  // when the newest frame came

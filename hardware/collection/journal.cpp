@@ -58,8 +58,7 @@ bool parse_records(std::span<const std::byte> payload, std::vector<JournalRecord
 
 }  // namespace
 
-JournalWriter::JournalWriter(const std::string& path, std::string_view header, std::uint64_t most_bytes)
-    : path_(path), most_bytes_(most_bytes) {
+JournalWriter::JournalWriter(const std::string& path, std::string_view header) : path_(path) {
   descriptor_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   if (descriptor_ < 0) {
     throw JournalError("journal " + path + ": cannot be created: " + strerror(errno) +
@@ -93,13 +92,6 @@ void JournalWriter::append(JournalStream stream, RecordKind kind, double time_s,
   std::lock_guard lock(mutex_);
   if (pending_bytes_ > (64 << 20)) {
     if (error_.empty()) error_ = "journal " + path_ + ": the disk is too slow, 64 MB wait to be written";
-    return;
-  }
-  bytes_ += kRecordHeader + bytes.size();
-  if (bytes_ > most_bytes_) {
-    if (error_.empty())
-      error_ = "journal " + path_ + ": expected at most " + std::to_string(most_bytes_ / 1'000'000) +
-               " MB from this plan, found more; a port sends more than its device can, check both";
     return;
   }
   if (pending_bytes_ == 0) oldest_pending_ = time_s;

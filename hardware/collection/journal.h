@@ -38,10 +38,9 @@ struct JournalRecord {
 /// Writes one journal. Records may come from any thread; two threads of its own write and sync them.
 class JournalWriter {
  public:
-  /// Creates `path` (never overwrites). `header` is one line that says what is collected. More than
-  /// `most_bytes` are an error: some device talks without end. Throws JournalError.
-  JournalWriter(const std::string& path, std::string_view header,
-                std::uint64_t most_bytes = std::uint64_t{1} << 36);
+  /// Creates `path` (never overwrites). `header` is one line that says what is collected. Throws
+  /// JournalError.
+  JournalWriter(const std::string& path, std::string_view header);
   /// Writes what is left. Errors are lost here: call close() to see them.
   ~JournalWriter();
   JournalWriter(const JournalWriter&) = delete;
@@ -72,7 +71,6 @@ class JournalWriter {
   std::condition_variable wake_, stopping_;
   std::map<JournalStream, std::vector<std::vector<std::byte>>> pending_;  // payloads of chunks
   std::size_t pending_bytes_ = 0;
-  std::uint64_t bytes_ = 0, most_bytes_;
   double oldest_pending_ = 0;  // recorded time of the first record in pending_
   std::string error_;
   bool flush_due_ = false, stop_ = false;

@@ -6,7 +6,7 @@
 namespace supertac {
 namespace {
 
-// Of a run whose printer says that it is busy for ever, or whose board sends more than a board can.
+// Of a run whose printer says that it is busy for ever.
 double longest_run_s(const RecorderSettings& settings) {
   double planned = 0;
   for (const Leg& leg : legs_of(settings.bed.plan, settings.bed.origin)) planned += ordered_s(leg);
@@ -39,8 +39,7 @@ PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& 
 // way.
 void hear_board(SensorReader& board, Printer& printer, const RecorderSettings& settings,
                 JournalWriter& journal) {
-  const double silence_s = settings.reader.silence_s;
-  printer.link().idle(0.1 + (silence_s > 0 ? silence_s : SensorReader::silence_s(settings.sensor)));
+  printer.link().idle(0.1 + board.silence_s());
   for (int i = 0; i < 100 && !board.next(0.02); ++i) check_stop(settings, journal);  // throws what ended it
 }
 
@@ -57,7 +56,7 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
     auto port = std::make_unique<CapturedPort>(std::move(board_port), journal, JournalStream::board);
     SensorReader board({.port = std::move(port)}, settings.sensor, settings.reader);
     hear_board(board, printer, settings, journal);
-    report.outcome = Palpation(printer, settings.bed.plan, observer_for(settings, journal, board)).run();
+    report.outcome = run_palpation(printer, settings.bed.plan, observer_for(settings, journal, board));
     report.kept = printer.put_back();
   } catch (...) {
     printer.put_back();
@@ -78,14 +77,7 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
 
 RecorderReport record_palpation(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
                                 const RecorderSettings& settings) {
-  // Of both ports: twice what the rig has to say, and a sensor's numbers as text, ten times as often as it
-  // says.
-  const double bytes_per_s = settings.sensor.frame.kind == FrameKind::board
-                                 ? 400e3
-                                 : 250e3 + 10 * settings.sensor.rate_hz *
-                                               (100 + 20.0 * static_cast<double>(settings.sensor.values()));
-  JournalWriter journal(settings.journal, settings.header,
-                        static_cast<std::uint64_t>(bytes_per_s * longest_run_s(settings)));
+  JournalWriter journal(settings.journal, settings.header);
   try {
     return record(std::move(board), std::move(printer), settings, journal);
   } catch (...) {

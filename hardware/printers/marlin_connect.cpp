@@ -15,11 +15,11 @@ constexpr double kConnectDeadline = 20, kProbeInterval = 1, kKlipperStarts = 60;
 
 void MarlinLink::connect() {
   connected_ = false;
-  const double until = lines_.port().now() + kConnectDeadline;
+  const double until = port_.now() + kConnectDeadline;
   // Two answers in a row: the first ok may belong to something an earlier program sent.
   int answers = 0;
   while (answers < 2) {
-    const double now = lines_.port().now();
+    const double now = port_.now();
     if (now >= until) nobody_answered();
     answers = probe(std::min(until, now + kProbeInterval)) ? answers + 1 : 0;
   }
@@ -32,14 +32,14 @@ void MarlinLink::connect() {
 
 // Klipper's host answers from the moment it runs, but moves nothing before it has found its boards.
 void MarlinLink::await_klipper() {
-  const double until = lines_.port().now() + kKlipperStarts;
+  const double until = port_.now() + kKlipperStarts;
   for (;;) {
     try {
       command("G21");
       return;
     } catch (const PrinterRefused& refused) {
       if (std::string_view(refused.what()).find("Printer is not ready") == std::string_view::npos ||
-          lines_.port().now() > until)
+          port_.now() > until)
         throw;
     }
     idle(1);
@@ -47,11 +47,11 @@ void MarlinLink::await_klipper() {
 }
 
 void MarlinLink::nobody_answered() {
-  const std::string expected = "port " + lines_.name() + ": expected a Marlin firmware, found ";
+  const std::string expected = "port " + port_.name() + ": expected a Marlin firmware, found ";
   const std::string within = " answer to M110 within " + format(kConnectDeadline, 0) + " s; ";
-  const unsigned baud = lines_.port().baud();
-  if (lines_.bytes() > 0) {
-    throw WrongDevice(expected + std::to_string(lines_.bytes()) + " bytes that are no" + within +
+  const unsigned baud = port_.baud();
+  if (bytes_ > 0) {
+    throw WrongDevice(expected + std::to_string(bytes_) + " bytes that are no" + within +
                       "check that it is the printer's port (supertac-check machine)" +
                       (baud > 0 ? " and that its baud rate is " + std::to_string(baud) : "") +
                       (complaint_.empty() ? "" : "; it said " + in_quotes(complaint_)));
@@ -61,14 +61,14 @@ void MarlinLink::nobody_answered() {
 
 void MarlinLink::refuse_board() const {
   constexpr std::size_t kFewFrames = 3 * rig::kFrameBytes;
-  if (lines_.bytes() > kFewFrames && 3 * lines_.no_text() > lines_.bytes())
-    throw WrongDevice("port " + lines_.name() +
+  if (bytes_ > kFewFrames && 3 * no_text_ > bytes_)
+    throw WrongDevice("port " + port_.name() +
                       ": expected a Marlin printer, found no text, as from a tactile board; exchange the two "
                       "ports");
 }
 
 bool MarlinLink::probe(double until) {
-  lines_.send("\n" + numbered_line(0, "M110 N0"));
+  send("\n" + numbered_line(0, "M110 N0"));
   std::string line;
   while (read_line(until, line)) {
     const Reply reply = parse_reply(line);
@@ -102,7 +102,7 @@ void MarlinLink::read_capabilities() {
     capabilities_.klipper = firmware.starts_with("Klipper");
   }
   if (!marlin && !capabilities_.klipper)
-    throw WrongDevice("port " + lines_.name() + ": expected Marlin or Klipper, found " +
+    throw WrongDevice("port " + port_.name() + ": expected Marlin or Klipper, found " +
                       (firmware.empty() ? "none" : in_quotes(firmware)) +
                       " as its name (M115), which is neither; use a printer with one of the two");
 }

@@ -24,14 +24,14 @@ constexpr std::int64_t kFarAhead = 1000;  // no firmware takes such a number for
 
 }  // namespace
 
-double LinePort::send(const std::string& text) {
+double MarlinLink::send(const std::string& text) {
   constexpr double kWriteDeadline = 2;  // s
   const double before = port_.now();
   port_.write(std::as_bytes(std::span(text)), before + kWriteDeadline);
   return before;
 }
 
-bool LinePort::take(std::string& line) {
+bool MarlinLink::take_line(std::string& line) {
   for (;;) {
     const std::size_t end = input_.find_first_of("\r\n");
     if (end == std::string::npos) return false;
@@ -42,23 +42,29 @@ bool LinePort::take(std::string& line) {
   }
 }
 
-bool LinePort::read(double until, std::string& line) {
+bool MarlinLink::read_line(double until, std::string& line) {
   constexpr double kWatchInterval = 0.02;  // a fifth of the 0.1 s in which an unplugged board must be noticed
   std::array<std::byte, 4096> buffer{};    // no line is longer
-  while (!take(line)) {
-    if (arrival_s_ >= until) return false;  // bytes or lines may come for ever
+  until = std::min(until, give_up_s_);
+  bool answered = take_line(line);
+  double now = arrival_s_;
+  while (!answered && now < until) {  // bytes or lines may come for ever
     if (watch_) watch_();
     const Received got = port_.read(buffer, watch_ ? std::min(until, port_.now() + kWatchInterval) : until);
+    now = got.time_s;
+    if (got.count > 0) arrival_s_ = now;
+    bytes_ += got.count;
     const auto bytes = std::span(buffer).first(got.count);
-    if (bytes.empty() && got.time_s >= until) return false;
-    if (!bytes.empty()) arrival_s_ = got.time_s;
-    bytes_ += bytes.size();
     no_text_ +=
         static_cast<std::size_t>(std::ranges::count_if(bytes, [](std::byte b) { return !is_text(b); }));
     input_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     if (input_.size() > buffer.size() && input_.find_first_of("\r\n") == std::string::npos) input_.clear();
+    answered = take_line(line);
   }
-  return true;
+  if (now < give_up_s_) return answered;
+  throw PrinterSilent("printer " + port_.name() + ": did not come to an end in time" +
+                      (complaint_.empty() ? "" : ", it said " + in_quotes(complaint_)) +
+                      "; check the printer and start again");
 }
 
 struct MarlinLink::Exchange {
@@ -86,7 +92,7 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
   // Taken is not finished: the ok of a command behind it in the queue tells when a long one has ended.
   for (int attempt = 0; exchange.proven && deadline_s > kOkDeadline; ++attempt) {
     if (attempt == kAttempts)
-      throw PrinterSilent("printer " + lines_.name() + ": expected an ok to M400 behind " + in_quotes(code) +
+      throw PrinterSilent("printer " + port_.name() + ": expected an ok to M400 behind " + in_quotes(code) +
                           ", found none of " + std::to_string(kAttempts) +
                           "; check the printer and the cable");
     const Exchange behind = exchange_of("M400", deadline_s);
@@ -97,9 +103,9 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
 }
 
 MarlinLink::Exchange MarlinLink::exchange_of(std::string_view code, double deadline_s) {
-  if (halted_) throw PrinterHalted("printer " + lines_.name() + ": halted earlier; reset it and start again");
+  if (halted_) throw PrinterHalted("printer " + port_.name() + ": halted earlier; reset it and start again");
   std::string early;  // what was read before a question is no answer to it
-  while (lines_.take(early)) check_alarm(parse_reply(early));
+  while (take_line(early)) check_alarm(parse_reply(early));
   const std::string text = capabilities_.emergency_parser ? shielded(code) : std::string(code);
   kept_.push_back(numbered_line(number_ + 1, text));
   ++number_;
@@ -108,7 +114,7 @@ MarlinLink::Exchange MarlinLink::exchange_of(std::string_view code, double deadl
   exchange.code = text;
   exchange.once = capabilities_.klipper && code.starts_with("G1 ");
   exchange.answer.repeated = owed_ > 0;  // and an ok may have been lost
-  exchange.answer.sent_s = lines_.send(kept_.back());
+  exchange.answer.sent_s = send(kept_.back());
   ++owed_;
   exchange.until = exchange.answer.sent_s + exchange.deadline_s;
   // Behind its deadline a long command may still have to be asked for.
@@ -118,9 +124,9 @@ MarlinLink::Exchange MarlinLink::exchange_of(std::string_view code, double deadl
   while (!exchange.done) {
     const bool answered = read_line(std::min(exchange.until, exchange.limit), line);
     if (answered) on_reply(exchange, parse_reply(line));
-    const double now = answered ? lines_.arrival_s() : lines_.port().now();
+    const double now = answered ? arrival_s_ : port_.now();
     if (!exchange.done && now >= exchange.limit) {
-      throw PrinterSilent("printer " + lines_.name() + ": expected the end of " + in_quotes(code) +
+      throw PrinterSilent("printer " + port_.name() + ": expected the end of " + in_quotes(code) +
                           " within " + format(exchange.limit - exchange.answer.sent_s, 0) +
                           " s, found other answers (" + in_quotes(line) +
                           " last); check the printer and start again");
@@ -139,7 +145,7 @@ void MarlinLink::finish(const Exchange& exchange) {
   // every later answer by one.
   if (exchange.answer.repeated) settle();
   if (exchange.error_stands) {
-    throw PrinterRefused("printer " + lines_.name() + ": refused " +
+    throw PrinterRefused("printer " + port_.name() + ": refused " +
                          in_quotes(kept_.back().substr(0, kept_.back().size() - 1)) + ": " +
                          printable(exchange.error, 200));
   }
@@ -148,7 +154,7 @@ void MarlinLink::finish(const Exchange& exchange) {
 void MarlinLink::count_copy(Exchange& exchange, const std::string& why) {
   const bool loop = ++exchange.copies > 4 * kMaxRepeats;
   if (++exchange.repeats > kMaxRepeats || loop) {
-    const std::string text = "printer " + lines_.name() + ": line " + std::to_string(exchange.cursor) +
+    const std::string text = "printer " + port_.name() + ": line " + std::to_string(exchange.cursor) +
                              " repeated " + std::to_string((loop ? exchange.copies : exchange.repeats) - 1) +
                              " times without success (" + why + ")";
     if (exchange.fault || loop) throw ResendLoop(text + ": resend loop; check the cable and start again");
@@ -164,15 +170,14 @@ void MarlinLink::count_copy(Exchange& exchange, const std::string& why) {
 void MarlinLink::repeat(Exchange& exchange, const std::string& why) {
   count_copy(exchange, why);
   // The line break ends what may be left of a damaged line; Marlin ignores empty ones.
-  exchange.until =
-      exchange.deadline_s +
-      lines_.send("\n" + kept_[kept_.size() - 1 - static_cast<std::size_t>(number_ - exchange.cursor)]);
+  exchange.until = exchange.deadline_s +
+                   send("\n" + kept_[kept_.size() - 1 - static_cast<std::size_t>(number_ - exchange.cursor)]);
 }
 
 void MarlinLink::ask(Exchange& exchange) {
   count_copy(exchange, "no answer");
   exchange.asked = !capabilities_.klipper;
-  exchange.until = kOkDeadline + lines_.send("\n" + numbered_line(number_ + kFarAhead, "M105"));
+  exchange.until = kOkDeadline + send("\n" + numbered_line(number_ + kFarAhead, "M105"));
 }
 
 void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
@@ -189,7 +194,7 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
       exchange.answer.repeated = true;  // M108, which answers it, has an ok of its own
       [[fallthrough]];
     case ReplyKind::busy:
-      exchange.until = std::max(exchange.until, lines_.arrival_s() + kBusyDeadline);
+      exchange.until = std::max(exchange.until, arrival_s_ + kBusyDeadline);
       break;
     case ReplyKind::line_fault:
       ++counters_.faults;
@@ -235,11 +240,11 @@ void MarlinLink::on_unknown_command(Exchange& exchange, const Reply& reply) {
 // Klipper checks no line: a damaged move may run as another one, and only its queue's end tells.
 void MarlinLink::give_back(Exchange& exchange) {
   exchange.done = exchange.answer.repeated = true;
-  exchange.answer.answered_s = lines_.port().now();
+  exchange.answer.answered_s = port_.now();
 }
 
 void MarlinLink::on_ok(Exchange& exchange) {
-  exchange.answer.answered_s = lines_.arrival_s();
+  exchange.answer.answered_s = arrival_s_;
   if (exchange.done) return;
   if (exchange.asked && !exchange.fault) return;  // late, or the question's: the last line taken decides
   if (exchange.fault && exchange.once) return give_back(exchange);
@@ -262,7 +267,7 @@ void MarlinLink::on_last_line(Exchange& exchange, std::int64_t last) {
     if (last > exchange.number) return;  // damaged text
     exchange.done = true;                // it was taken: its ok was lost
     exchange.proven = true;
-    exchange.answer.answered_s = lines_.arrival_s();
+    exchange.answer.answered_s = arrival_s_;
     exchange.answer.repeated = true;
     exchange.error_stands = !exchange.error.empty();
     return;
@@ -274,13 +279,13 @@ void MarlinLink::on_last_line(Exchange& exchange, std::int64_t last) {
     if (!believed) return;
     if (next <= 1) {
       connected_ = false;
-      throw PrinterReset("printer " + lines_.name() + ": its line number fell back from " +
+      throw PrinterReset("printer " + port_.name() + ": its line number fell back from " +
                          std::to_string(exchange.number - 1) +
                          " to 0, so it restarted; its position is unknown");
     }
   }
   if (next <= number_ - static_cast<std::int64_t>(kept_.size())) {
-    throw ResendLoop("printer " + lines_.name() + ": asks for line " + std::to_string(next) + ", kept are " +
+    throw ResendLoop("printer " + port_.name() + ": asks for line " + std::to_string(next) + ", kept are " +
                      std::to_string(number_ - static_cast<std::int64_t>(kept_.size()) + 1) + " to " +
                      std::to_string(number_) + "; start again");
   }
@@ -288,7 +293,7 @@ void MarlinLink::on_last_line(Exchange& exchange, std::int64_t last) {
   exchange.cursor = next;
 }
 
-void MarlinLink::emergency(std::string_view code) { lines_.send("\n" + std::string(code) + "\n"); }
+void MarlinLink::emergency(std::string_view code) { send("\n" + std::string(code) + "\n"); }
 
 void MarlinLink::stop() {
   emergency("M410");
@@ -296,28 +301,28 @@ void MarlinLink::stop() {
 }
 
 void MarlinLink::abandon(double seconds) {
-  const double until = lines_.port().now() + seconds;
+  const double until = port_.now() + seconds;
   std::string line;
   while (owed_ > 0 && read_line(until, line)) check_alarm(parse_reply(line));
   settle();
 }
 
 void MarlinLink::idle(double seconds) {
-  const double until = lines_.port().now() + seconds;
+  const double until = port_.now() + seconds;
   std::string line;
   while (read_line(until, line)) check_alarm(parse_reply(line));
 }
 
 void MarlinLink::settle() {
-  const double limit = lines_.port().now() + 2;
+  const double limit = port_.now() + 2;
   std::string line;
-  double quiet_until = lines_.port().now() + kQuiet;
+  double quiet_until = port_.now() + kQuiet;
   while (read_line(std::min(quiet_until, limit), line)) {
     const Reply reply = parse_reply(line);
     heed(reply);
     // Reports come for ever; what is waited for is the end of answers.
     const bool report = reply.kind == ReplyKind::position || reply.kind == ReplyKind::temperature;
-    if (!report) quiet_until = lines_.arrival_s() + kQuiet;
+    if (!report) quiet_until = arrival_s_ + kQuiet;
   }
   forget();
   owed_ = 0;
@@ -326,8 +331,8 @@ void MarlinLink::settle() {
 // Answers, and half an answer such as an ok whose line break was lost; not what is said unasked.
 void MarlinLink::forget() {
   std::string line;
-  while (lines_.take(line)) heed(parse_reply(line));
-  lines_.forget();
+  while (take_line(line)) heed(parse_reply(line));
+  input_.erase(input_.find_last_of("\r\n") + 1);
 }
 
 void MarlinLink::heed(const Reply& reply) {
@@ -348,7 +353,7 @@ void MarlinLink::check_alarm(const Reply& reply) {
   }
   if (reply.kind == ReplyKind::fatal) {
     halted_ = true;
-    throw PrinterHalted("printer " + lines_.name() + ": the firmware halted (" +
+    throw PrinterHalted("printer " + port_.name() + ": the firmware halted (" +
                         (complaint_.empty() ? "" : in_quotes(complaint_) + ", ") + in_quotes(reply.text) +
                         "); nothing more is sent, reset the printer and check it");
   }
@@ -356,7 +361,7 @@ void MarlinLink::check_alarm(const Reply& reply) {
   if (reply.kind == ReplyKind::start) {
     connected_ = false;
     throw PrinterReset(
-        "printer " + lines_.name() +
+        "printer " + port_.name() +
         ": the firmware restarted in use; its position is unknown, confirm the origin and start "
         "again; it said " +
         in_quotes(reply.text));
@@ -366,20 +371,11 @@ void MarlinLink::check_alarm(const Reply& reply) {
     if (reply.kind == ReplyKind::paused) emergency("M108");
     return;
   }
-  throw PrinterPaused("printer " + lines_.name() + ": " +
+  throw PrinterPaused("printer " + port_.name() + ": " +
                       (reply.kind == ReplyKind::paused
                            ? "waits for its user; look at the printer's display and start again"
                            : "was stopped or paused at its display, or by itself (" + in_quotes(reply.text) +
                                  "); look at it and start again"));
-}
-
-bool MarlinLink::read_line(double until, std::string& line) {
-  const bool answered = lines_.read(std::min(until, give_up_s_), line);
-  const double now = answered ? lines_.arrival_s() : std::min(until, give_up_s_);
-  if (now < give_up_s_) return answered;
-  throw PrinterSilent("printer " + lines_.name() + ": did not come to an end in time" +
-                      (complaint_.empty() ? "" : ", it said " + in_quotes(complaint_)) +
-                      "; check the printer and start again");
 }
 
 }  // namespace supertac

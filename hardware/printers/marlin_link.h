@@ -19,38 +19,6 @@
 
 namespace supertac {
 
-/// Gathers the bytes of a port to lines of text. Times are seconds of the port's clock.
-class LinePort {
- public:
-  /// `port` must outlive it.
-  explicit LinePort(Port& port) : port_(port) {}
-  /// Called at least every 0.02 s while read() waits; what it throws ends the wait.
-  void set_watch(std::function<void()> watch) { watch_ = std::move(watch); }
-
-  /// Returns the port's time (s) before the write. Throws as Port::write().
-  double send(const std::string& text);
-  /// The next line that is not empty, without its break and trailing blanks; false when `until` (s, on the
-  /// port's clock) passes first, also where bytes or lines come for ever. Throws as Port::read().
-  bool read(double until, std::string& line);
-  /// The next line of what has been received already, without waiting; false when there is none.
-  bool take(std::string& line);
-  /// Drops the beginning of a line whose break has not come.
-  void forget() { input_.erase(input_.find_last_of("\r\n") + 1); }
-
-  double arrival_s() const { return arrival_s_; }   ///< of the last byte received
-  std::size_t bytes() const { return bytes_; }      ///< received so far
-  std::size_t no_text() const { return no_text_; }  ///< of these, bytes that stand in no text (is_text())
-  Port& port() { return port_; }
-  const std::string& name() const { return port_.name(); }
-
- private:
-  Port& port_;
-  std::function<void()> watch_;
-  std::string input_;  // received, not yet a whole line
-  double arrival_s_ = 0;
-  std::size_t bytes_ = 0, no_text_ = 0;
-};
-
 constexpr int kAttempts = 6;  ///< at an answer that is not damaged
 
 /// What a firmware says of itself (M115).
@@ -81,7 +49,7 @@ class MarlinLink {
   };
 
   /// `port` must outlive the link.
-  explicit MarlinLink(Port& port) : lines_(port) {}
+  explicit MarlinLink(Port& port) : port_(port) {}
 
   /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, reads M115; waits for a
   /// Klipper that still starts. Throws PrinterSilent; WrongDevice when what comes is no such firmware's
@@ -121,14 +89,14 @@ class MarlinLink {
   void settle();
 
   /// Called at least every 0.02 s while waiting for the firmware; what it throws ends the wait.
-  void set_watch(std::function<void()> watch) { lines_.set_watch(std::move(watch)); }
+  void set_watch(std::function<void()> watch) { watch_ = std::move(watch); }
 
   const MarlinCapabilities& capabilities() const { return capabilities_; }
   const Counters& counters() const { return counters_; }
   bool halted() const { return halted_; }
   /// Connected, and neither halted nor restarted since.
   bool in_use() const { return connected_ && !halted_; }
-  Port& port() { return lines_.port(); }
+  Port& port() { return port_; }
 
  private:
   struct Exchange;
@@ -154,10 +122,20 @@ class MarlinLink {
   void forget();
   void heed(const Reply& reply);
   void check_alarm(const Reply& reply);
-  /// As LinePort::read(), and gives up when it is time to.
+  /// Returns the port's time (s) before the write. Throws as Port::write().
+  double send(const std::string& text);
+  /// The next line of what has been received already, not empty, without its break and trailing blanks; false
+  /// when there is none.
+  bool take_line(std::string& line);
+  /// Waits for it; false when `until` (s, on the port's clock) passes first, also where bytes or lines come
+  /// for ever. Throws as Port::read(), and PrinterSilent when it is time to give up.
   bool read_line(double until, std::string& line);
 
-  LinePort lines_;
+  Port& port_;
+  std::function<void()> watch_;
+  std::string input_;                    // received, not yet a whole line
+  double arrival_s_ = 0;                 // of the last byte received
+  std::size_t bytes_ = 0, no_text_ = 0;  // received so far; those that stand in no text (is_text())
   MarlinCapabilities capabilities_;
   Counters counters_;
   std::string complaint_;         // what was said since an ok; the cause of a halt stands before it

@@ -53,6 +53,27 @@ unsigned take_baud(JsonObject& keys, unsigned fallback) {
 
 Json json_of(const Point3& p) { return {p.x, p.y, p.z}; }
 
+class Palpation {
+ public:
+  Palpation(Printer& printer, const PalpationPlan& plan, const PalpationObserver& observer)
+      : printer_(printer), plan_(plan), observer_(observer) {}
+  PalpationOutcome run();
+
+ private:
+  void run_leg(Leg& leg);
+  void measure_start(const Leg& onset);
+  void touch(bool contact);
+  void follow(const Leg& leg);
+  void recover(PalpationOutcome& outcome);
+
+  Printer& printer_;
+  const PalpationPlan& plan_;
+  const PalpationObserver& observer_;
+  bool realtime_known_ = false, realtime_ = true;
+  bool in_contact_ = false;
+  double longest_leg_s_ = 0;  // that a firmware may have to come to the end of
+};
+
 }  // namespace
 
 const char* name_of(Phase phase) {
@@ -118,14 +139,12 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Li
   return legs;
 }
 
-Palpation::Palpation(Printer& printer, const PalpationPlan& plan, PalpationObserver observer)
-    : printer_(printer), plan_(plan), observer_(std::move(observer)) {}
+PalpationOutcome run_palpation(Printer& printer, const PalpationPlan& plan,
+                               const PalpationObserver& observer) {
+  return Palpation(printer, plan, observer).run();
+}
 
 PalpationOutcome Palpation::run() {
-  if (printer_.origin() == Printer::Origin::unknown) {
-    throw OriginUnknown(
-        "palpation: the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
-  }
   std::vector<Leg> legs = legs_of(plan_, printer_.target(), printer_.limits());
   std::vector<Point3> targets;
   for (const Leg& leg : legs) {
@@ -163,7 +182,7 @@ void Palpation::touch(bool contact) {
 // Without M114 R nothing but M400 tells where the head is in time. What short moves at the slide's speed take
 // beyond their length over it - the delay of their start and their ramps - holds for the slide as well; at a
 // slow speed next to nothing of it is ramps.
-void Palpation::measure_start(Leg onset) {
+void Palpation::measure_start(const Leg& onset) {
   // Of different lengths: a firmware that answers M400 every 0.1 s would be late by the same time at all of
   // them.
   const Point3 here = onset.from;

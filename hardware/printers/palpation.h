@@ -94,29 +94,9 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
 /// The same; throws OutsideLimits where a target or the way to it is not allowed.
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Limits& limits);
 
-/// One run of a plan with a printer.
-class Palpation {
- public:
-  /// `printer` must outlive it.
-  Palpation(Printer& printer, const PalpationPlan& plan, PalpationObserver observer = {});
-
-  /// Throws OutsideLimits, OriginUnknown or std::invalid_argument before anything moves; after that every
-  /// failure is in the outcome.
-  PalpationOutcome run();
-
- private:
-  void run_leg(Leg& leg);
-  void measure_start(Leg onset);
-  void touch(bool contact);
-  void follow(const Leg& leg);
-  void recover(PalpationOutcome& outcome);
-
-  Printer& printer_;
-  PalpationPlan plan_;
-  PalpationObserver observer_;
-  bool realtime_known_ = false, realtime_ = true;
-  bool in_contact_ = false;
-  double longest_leg_s_ = 0;  // that a firmware may have to come to the end of
-};
+/// One run of a plan with a printer whose origin is known. Throws OutsideLimits or std::invalid_argument
+/// before anything moves; after that every failure is in the outcome.
+PalpationOutcome run_palpation(Printer& printer, const PalpationPlan& plan,
+                               const PalpationObserver& observer = {});
 
 }  // namespace supertac

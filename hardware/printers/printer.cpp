@@ -59,8 +59,6 @@ double trapezoid_duration(double distance, double speed, double acceleration) {
 
 double Limits::clearance_z() const { return plate.z + kClearance; }
 
-void Limits::check_target(const Point3& target) const { check_path(target, target); }
-
 void Limits::check_path(const Point3& from, const Point3& to) const {
   for (const Point3& end : {from, to}) {
     check_axis('X', end.x, low.x, high.x);
@@ -151,7 +149,7 @@ void Printer::home() {
 }
 
 void Printer::confirm_origin(const Point3& here) {
-  limits_.check_target(here);
+  limits_.check_path(here, here);
   link_.command("M400", kHomeDeadline);
   if (link_.capabilities().klipper)
     link_.command("SET_KINEMATIC_POSITION X=" + format(here.x, 3) + " Y=" + format(here.y, 3) +
@@ -171,8 +169,6 @@ MarlinLink::Answer Printer::start_move(const Point3& target, double speed_mm_s) 
     throw OriginUnknown(
         "printer: the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
   }
-  if (!(speed_mm_s > 0) || !std::isfinite(speed_mm_s))
-    throw std::invalid_argument("printer: expected a speed above 0 mm/s, got " + format(speed_mm_s));
   limits_.check_path(target_, target);
   const double length = distance(target_, target);
   MarlinLink::Answer answer = order(move_command(target, speed_mm_s), target_, target);

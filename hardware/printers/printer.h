@@ -19,9 +19,8 @@ struct Limits {
 
   /// Lowest z (mm) that is free everywhere: 3.19 above the slide.
   double clearance_z() const;
-  /// Throws OutsideLimits naming the axis, the value and the limit.
-  void check_target(const Point3& target) const;
-  /// Checks both ends and the straight line between them.
+  /// Checks both ends and the straight line between them. Throws OutsideLimits naming the axis, the value and
+  /// the limit.
   void check_path(const Point3& from, const Point3& to) const;
   bool operator==(const Limits&) const = default;
 };
@@ -115,8 +114,8 @@ class Printer {
   Origin origin() const { return origin_; }
 
   /// Sends one straight move and returns when the firmware has taken it (it starts some 0.1 s later).
-  /// Throws OriginUnknown, OutsideLimits, or std::invalid_argument for a speed that is not positive before
-  /// anything is sent; then as MarlinLink::command. Returns when it was sent and when the firmware said ok.
+  /// Throws OriginUnknown or OutsideLimits before anything is sent; then as MarlinLink::command. Returns when
+  /// it was sent and when the firmware said ok.
   MarlinLink::Answer start_move(const Point3& target, double speed_mm_s);
 
   /// Waits until the head stands (M400), then compares M114 with the last target. Throws PositionError when

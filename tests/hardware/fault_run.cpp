@@ -129,9 +129,7 @@ void judge_passes(const Collection& collection, const NumberedBoard& board, cons
 std::string check_finger(const PalpationOutcome& outcome, SimulatedRig& rig, const Point3& head,
                          double contact_z) {
   using Finger = PalpationOutcome::Finger;
-  const bool reachable = !rig.world().printer().unplugged();
-  if (outcome.finger == Finger::unknown && reachable)
-    return "the finger was left in contact: " + outcome.note;
+  if (outcome.finger == Finger::unknown) return "the finger was left in contact: " + outcome.note;
   if (outcome.finger == Finger::lifted && head.z < contact_z + 1)
     return "said lifted, is at " + describe(head);
   if (outcome.finger == Finger::stopped && rig.world().printer().moving(rig.now()))

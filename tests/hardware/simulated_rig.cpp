@@ -54,9 +54,8 @@ class SimulatedRig::PrinterPort : public Port {
 
  private:
   void check() const {
-    if (rig_.printer_gone_ || rig_.world_.printer().unplugged()) {
+    if (rig_.printer_gone_)
       throw PortUnplugged("port simulated printer: the device is gone; check the cable and start again");
-    }
   }
   SimulatedRig& rig_;
   std::string name_ = "simulated printer";

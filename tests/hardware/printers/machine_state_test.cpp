@@ -122,7 +122,7 @@ TEST(MachineState, HomingLiftsTenMillimetresWhateverTheUnit) {
 TEST(MachineState, SoftEndstopsThatWouldCutThePlanAreNamed) {
   PrinterBench bench(running_rig({.bed = {235, 150, 250}}));
   bench.printer.home();
-  EXPECT_ERROR(Palpation(bench.printer, {.passes = 1}).run(), OutsideLimits,
+  EXPECT_ERROR(run_palpation(bench.printer, {.passes = 1}), OutsideLimits,
                "its soft endstops (M211) would cut the way to X99.70 Y209.17");
 }
 
@@ -156,7 +156,7 @@ struct Interrupted {
       planted_s = bench.rig.now();
       plant(bench);
     };
-    outcome = Palpation(bench.printer, {.passes = 2}, observer).run();
+    outcome = run_palpation(bench.printer, {.passes = 2}, observer);
   }
   ReadyBench bench;
   double planted_s = 0;

@@ -12,8 +12,8 @@ using rig::kMounted;
 
 struct PalpationBench : ReadyBench {
   using ReadyBench::ReadyBench;
-  PalpationOutcome run(PalpationPlan plan, PalpationObserver observer = {}) {
-    return Palpation(printer, plan, std::move(observer)).run();
+  PalpationOutcome run(const PalpationPlan& plan, const PalpationObserver& observer = {}) {
+    return run_palpation(printer, plan, observer);
   }
   /// Does `plant` once, when the head is in the slide of pass 1.
   PalpationObserver in_slide(std::function<void()> plant) {
@@ -157,7 +157,7 @@ TEST(Bed, TheLimitsMoveWithThePlate) {
   EXPECT_DOUBLE_EQ(there.clearance_z(), -5);
   const auto allowed = [](const Limits& limits, double x, double y, double z) {
     try {
-      limits.check_target({x, y, z});
+      limits.check_path({x, y, z}, {x, y, z});
       return true;
     } catch (const std::exception&) {
       return false;

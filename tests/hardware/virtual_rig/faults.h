@@ -17,24 +17,11 @@ struct RigFaults {
   double reset_rate = 0;         ///< per line: the firmware restarts
   double action_rate = 0;        ///< per line: the display says //action:cancel or its like
   double pause_rate = 0;         ///< per line: it waits for its user when the move has ended
-  double unplug_rate = 0;        ///< per line: the printer's port goes away (in simulated time only)
   double stall_rate =
       0;  ///< per line: the firmware answers 50 ms late; per frame: the board sends 20 ms late
   double freeze_rate = 0;       ///< per line and per frame: 0.3 to 2 s without motion and answers, or frames
   double lost_frame_rate = 0;   ///< per frame: USB was busy, the frame vanishes
   double host_freeze_rate = 0;  ///< per call of the printer's port: the host stands still for 0.1 to 2 s
-
-  /// The mix of `--faults RATE`: bytes at `rate`, every other fault scaled so that resets and unplugs stay
-  /// rare enough for some collections to finish.
-  static RigFaults mixed(double rate) {
-    return {.byte_rate = rate,
-            .lost_ok_rate = rate,
-            .resend_storm_rate = rate / 10,
-            .reset_rate = rate / 200,
-            .unplug_rate = rate / 200,
-            .stall_rate = rate / 10,
-            .lost_frame_rate = rate};
-  }
 };
 
 /// A stream of decisions.

@@ -104,10 +104,6 @@ class FaultyPtyRig : public PtyRig {
     const std::lock_guard lock(mutex_);
     board_.unplug();
   }
-  void unplug_printer() {
-    const std::lock_guard lock(mutex_);
-    printer_.unplug();
-  }
 };
 
 }  // namespace supertac

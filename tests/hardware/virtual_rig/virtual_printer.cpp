@@ -107,7 +107,7 @@ void VirtualPrinter::reset(double t) {
 
 void VirtualPrinter::receive(std::string_view bytes, double t) {
   advance(t);
-  if (booting_ || (halted_ && !klipper()) || unplugged_) return;
+  if (booting_ || (halted_ && !klipper())) return;
   for (const char c : bytes) on_character(c, t);
   advance(t);
 }
@@ -163,7 +163,7 @@ void VirtualPrinter::accept_line(const std::string& line, double t) {
   if (!taken) return;
   const std::string& command = *taken;
   if (line[0] == 'N' && hook_) hook_(lines_.last, command, t);
-  if (halted_ || booting_ || unplugged_) return;
+  if (halted_ || booting_) return;
   // Without an emergency parser an unnumbered stop acts when its line is read.
   if (!settings_.emergency_parser && (command == "M112" || command == "M410" || command == "M108")) {
     act_on_critical(std::string_view(command).substr(1), t);
@@ -196,7 +196,7 @@ void VirtualPrinter::complain(const std::string& text) {
 }
 
 void VirtualPrinter::advance(double t) {
-  while (next_event() <= t && !unplugged_) {
+  while (next_event() <= t) {
     now_ = std::max(now_, next_event());
     if (booting_) {
       booting_ = false;
@@ -219,7 +219,7 @@ void VirtualPrinter::advance(double t) {
 }
 
 double VirtualPrinter::next_event() const {
-  if (halted_ || unplugged_) return kNever;
+  if (halted_) return kNever;
   if (booting_) return boot_end_;
   double next = kNever;
   if (blocked_) {
@@ -263,10 +263,6 @@ void VirtualPrinter::start_next(double t) {
 
 bool VirtualPrinter::random_trouble(double t) {
   const RigFaults& faults = settings_.faults;
-  if (dice_.hit(faults.unplug_rate)) {
-    unplugged_ = true;
-    return true;
-  }
   if (dice_.hit(faults.reset_rate)) {
     reset(t);
     return true;

@@ -53,7 +53,7 @@ struct VirtualPrinterSettings {
   bool heartbeat = false;      ///< `wait` every second when idle
   double boot_s = 0.4;         ///< power-on to `start`
   std::string boot_garbage{};  ///< bytes sent before the banner
-  RigFaults faults{};          ///< lost ok, storms, resets, unplug, stalls; bytes are the port's matter
+  RigFaults faults{};          ///< lost ok, storms, resets, stalls; bytes are the port's matter
   std::uint64_t seed = 1;
 };
 
@@ -86,7 +86,6 @@ class VirtualPrinter {
   Point3 head(double t);
   bool moving(double t) { return motion_.end_time() > t; }
   bool halted() const { return halted_; }
-  bool unplugged() const { return unplugged_; }
   /// Restarts the firmware at time t: the position is forgotten, moves stop where they are.
   void reset(double t);
   /// Called with every numbered line that is about to run, and its time; the tests' hook for planting faults.
@@ -166,7 +165,7 @@ class VirtualPrinter {
   double feed_ = 10;
   double position_every_ = 0, position_due_ = 0, temperature_every_ = 0, temperature_due_ = 0;  // 0: off
   NumberedLines lines_;
-  bool booting_ = false, blocked_ = false, homed_ = false, halted_ = false, unplugged_ = false;
+  bool booting_ = false, blocked_ = false, homed_ = false, halted_ = false;
   bool repeat_after_block_ = false;  // what holds the firmware is no command: no ok at its end
   bool waits_for_user_ = false;
   bool may_move_ = false;  // Klipper was told a position
