@@ -88,10 +88,6 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   std::string problem_;
 };
 
-std::string shown(const Tree& json) {
-  return printable(json.dump(-1, ' ', true, Tree::error_handler_t::replace));
-}
-
 Tree parsed_entry(const std::map<std::string, std::string>& metadata, const std::string& path,
                   const std::string& key) {
   const auto found = metadata.find(key);
@@ -104,6 +100,10 @@ Tree parsed_entry(const std::map<std::string, std::string>& metadata, const std:
 }
 
 }  // namespace
+
+std::string shown(const Tree& json) {
+  return printable(json.dump(-1, ' ', true, Tree::error_handler_t::replace));
+}
 
 nlohmann::ordered_json parse_json_limited(std::string_view text, const JsonLimits& limits) {
   if (text.size() > limits.max_bytes) {

@@ -32,6 +32,9 @@ class JsonError : public std::runtime_error {
 /// would take it for the end).
 nlohmann::ordered_json parse_json_limited(std::string_view text, const JsonLimits& limits = {});
 
+/// A value as text for a message: printable ASCII, cut where it is long.
+std::string shown(const nlohmann::ordered_json& json);
+
 /// A JSON object whose values are read with checks. Every accessor throws FileError that names the key, what
 /// was expected and found; a value that is absent is the fallback, or refused where there is none.
 class JsonObject {

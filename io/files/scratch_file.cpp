@@ -22,19 +22,11 @@ std::string temporary_folder() {
   return chosen != nullptr && *chosen != '\0' ? chosen : "/var/tmp";
 }
 
-// In turn, so that every process and thread tries a name of its own; O_EXCL refuses one that somebody
-// planted.
-std::string name_in(const std::string& folder) {
-  std::uint64_t number = 0;
-  if (::getentropy(&number, sizeof number) != 0) fail(folder, "name", errno);
-  return folder + "/.supertac-" + std::to_string(number);
-}
-
 }  // namespace
 
 ScratchFile::ScratchFile() : folder_(temporary_folder()) {
-  const std::string name = name_in(folder_);
-  file_ = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+  std::string name = folder_ + "/.supertac-XXXXXX";
+  file_ = ::mkostemp(name.data(), O_CLOEXEC);
   if (file_ < 0) fail(folder_, "make", errno);
   ::unlink(name.c_str());
 }

@@ -144,7 +144,7 @@ TEST(SafetensorsHostile, HeadersAreRefusedForTheirReason) {
       {"{", "end with"},
       {"{\"a\":}", "not valid JSON"},
       {std::string("{}\0}", 4), "NUL"},
-      {R"({"a":1})", "tensor 'a': expected an object, found a number"},
+      {R"({"a":1})", "tensor 'a': expected an object, found 1"},
       {R"({"a":null})", "tensor 'a': expected an object, found null"},
       {R"({"a":{}})", "needs exactly"},
       {R"({"a":{"dtype":"F32","shape":[1]}})", "needs exactly"},
@@ -156,24 +156,25 @@ TEST(SafetensorsHostile, HeadersAreRefusedForTheirReason) {
       {R"({"a":{"dtype":"F32","shape":[0],"data_offsets":[0,0]},"a":{}})", "twice"},
       {R"({"__metadata__":{"a":"b","a":"c"}})", "twice"},
       {R"({"__metadata__":{},"__metadata__":{}})", "twice"},
-      {R"({"__metadata__":{"a":{}}})", "'__metadata__' at 'a': expected a text, found an object"},
-      {R"({"__metadata__":{"a":1}})", "expected a text, found a number"},
-      {R"({"__metadata__":[]})", "expected an object, found an array"},
+      {R"({"__metadata__":{"a":{}}})", "'__metadata__' at 'a': expected a text, found {}"},
+      {R"({"__metadata__":{"a":1}})", "expected a text, found 1"},
+      {R"({"__metadata__":[]})", "expected an object, found []"},
       {R"({"a":{"dtype":"F99","shape":[1],"data_offsets":[0,4]}})", "unknown type 'F99'"},
-      {R"({"a":{"dtype":"F32","shape":[-1],"data_offsets":[0,4]}})", "negative"},
-      {R"({"a":{"dtype":"F32","shape":[1.0],"data_offsets":[0,4]}})", "fraction"},
-      {R"({"a":{"dtype":"F32","shape":[1e0],"data_offsets":[0,4]}})", "fraction"},
-      {R"({"a":{"dtype":"F32","shape":[18446744073709551616],"data_offsets":[0,4]}})", "beyond 64 bits"},
+      {R"({"a":{"dtype":"F32","shape":[-1],"data_offsets":[0,4]}})",
+       "a whole number from 0 to 2^64 - 1, found -1"},
+      {R"({"a":{"dtype":"F32","shape":[1.0],"data_offsets":[0,4]}})", "found 1.0"},
+      {R"({"a":{"dtype":"F32","shape":[1e0],"data_offsets":[0,4]}})", "found 1.0"},
+      {R"({"a":{"dtype":"F32","shape":[18446744073709551616],"data_offsets":[0,4]}})", "found 1.84467"},
       {R"({"a":{"dtype":"F32","shape":[4611686018427387905],"data_offsets":[0,4]}})", "too large"},
       {R"({"a":{"dtype":"U8","shape":[4294967296,4294967296],"data_offsets":[0,0]}})", "too large"},
       {R"({"a":{"dtype":"U8","shape":[1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1],"data_offsets":[0,1]}})",
        "more than 16 numbers in tensor 'a' at 'shape'"},
       {R"({"a":{"dtype":"U8","shape":[[1]],"data_offsets":[0,1]}})",
-       "tensor 'a' at 'shape': expected a whole number, found an array"},
+       "tensor 'a' at 'shape': expected a whole number from 0 to 2^64 - 1, found [1]"},
       {R"({"a":{"dtype":1,"shape":[1],"data_offsets":[0,4]}})",
-       "tensor 'a' at 'dtype': expected a text, found a number"},
+       "tensor 'a' at 'dtype': expected a text, found 1"},
       {R"({"a":{"dtype":"U8","shape":1,"data_offsets":[0,1]}})",
-       "tensor 'a' at 'shape': expected a list, found a number"},
+       "tensor 'a' at 'shape': expected a list, found 1"},
       {R"({"a":[[[[1]]]]})", "nested deeper than 4 levels"},
       {R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[4,0]}})", "spans"},
       {R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,4]}})", "spans"},
@@ -304,7 +305,7 @@ TEST(Safetensors, NamesTheFirstOfManyTensors) {
   write_safetensors(folder / "many", {}, tensors);
   const SafetensorsFile file = SafetensorsFile::read(folder / "many");
   const std::string text = what_of<FileError>([&] { file.f32("volts"); });
-  EXPECT_TRUE(text.ends_with("'tensor114', 'tensor115', ...)")) << text;
+  EXPECT_TRUE(text.ends_with("'tensor114', 'tens...)")) << text;
 }
 
 class Provenance : public testing::Test {
