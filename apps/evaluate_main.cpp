@@ -87,7 +87,7 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
     for (std::size_t n = 0; n < b.size(); ++n) {
       Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.predicted_error(n), b.input(n)};
       for (std::size_t k = 0; k < baselines.size(); ++k) {
-        baselines[k]->predict(b.input(n), plain[k]);
+        baselines[k].predict(b.input(n), plain[k]);
         drawn.pictures.push_back(plain[k]);
       }
       score(drawn, windows, scores);
@@ -112,8 +112,8 @@ Json result_of(const Arguments& a, const Ensemble& network, const WindowSet& win
   std::vector<float> image(windows.image().pixels());
   Json latencies = {{"network", measure_latency([&] { network.infer(window); })}};
   for (std::size_t k = 0; k < baselines.size(); ++k) {
-    const std::string name = baselines[k]->name();
-    latencies[name] = measure_latency([&] { baselines[k]->predict(window.values(), image); });
+    const std::string name = baselines[k].name;
+    latencies[name] = measure_latency([&] { baselines[k].predict(window.values(), image); });
     result["baselines"][name] = scores.of_method[k + 1].to_json();
   }
   result["over_passes"] = scores_by_pass(windows, scores.contact);

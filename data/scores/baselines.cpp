@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 #include "data/windows/split.h"
-#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -54,33 +53,27 @@ std::vector<float> weights_of(int taxels, int scale) {
 
 }  // namespace
 
-MeanImage::MeanImage(const WindowSet& windows, std::span<const std::uint32_t> train)
-    : array_(windows.array()), image_(windows.image().pixels()) {
-  std::vector<double> sum(image_.size());
-  std::vector<float> truth(image_.size());
+Baseline mean_image(const WindowSet& windows, std::span<const std::uint32_t> train) {
+  std::vector<float> truth(windows.image().pixels()), image;
+  std::vector<double> sum(truth.size());
   const std::vector<std::uint32_t> chosen = fitted_on(train);
   for (const std::uint32_t i : chosen) {
     windows.truth(i, truth);
     for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += truth[p];
   }
-  for (std::size_t p = 0; p < sum.size(); ++p)
-    image_[p] = static_cast<float>(sum[p] / static_cast<double>(chosen.size()));
+  for (const double s : sum) image.push_back(static_cast<float>(s / static_cast<double>(chosen.size())));
+  return {"mean_image", [array = windows.array(), image](auto input, auto out) {
+            check_input(input, array);
+            check_size("the image", out.size(), image.size());
+            std::ranges::copy(image, out.begin());
+          }};
 }
 
-void MeanImage::predict(std::span<const float> input, std::span<float> out) const {
-  check_input(input, array_);
-  check_size("the image", out.size(), image_.size());
-  std::copy(image_.begin(), image_.end(), out.begin());
-}
-
-Bicubic::Bicubic(int rows, int columns, int scale) {
-  for (const auto& [name, size] : {std::pair("rows", rows), {"columns", columns}, {"scale", scale}})
-    if (size < 1) throw std::invalid_argument(refusal("bicubic", name, "1 or more", std::to_string(size)));
-  rows_ = static_cast<std::size_t>(rows);
-  columns_ = static_cast<std::size_t>(columns);
-  down_ = weights_of(rows, scale);
-  across_ = weights_of(columns, scale);
-}
+Bicubic::Bicubic(int rows, int columns, int scale)
+    : rows_(static_cast<std::size_t>(rows)),
+      columns_(static_cast<std::size_t>(columns)),
+      down_(weights_of(rows, scale)),
+      across_(weights_of(columns, scale)) {}
 
 void Bicubic::operator()(std::span<const float> frame, std::span<float> out) const {
   const std::size_t height = down_.size() / rows_, width = across_.size() / columns_;
@@ -99,18 +92,23 @@ void Bicubic::operator()(std::span<const float> frame, std::span<float> out) con
   }
 }
 
-UpsampledFrame::UpsampledFrame(const WindowSet& windows, std::span<const std::uint32_t> train)
-    : array_(windows.array()),
-      delay_frames_(windows.delay_frames()),
-      upsampling_(array_.rows, array_.columns, windows.scale()) {
+Baseline upsampled_frame(const WindowSet& windows, std::span<const std::uint32_t> train) {
+  const TaxelArray array = windows.array();
+  const Bicubic upsampling(array.rows, array.columns, windows.scale());
+  // Of the frame that a window shows.
+  const auto enlarge = [=, back = windows.delay_frames()](std::span<const float> input,
+                                                          std::span<float> out) {
+    check_input(input, array);
+    const auto shown = input.last(array.signals() * (1 + back)).first(array.signals());
+    upsampling(mean_of_channels(array, shown), out);
+  };
   const std::size_t pixels = windows.image().pixels();
-  std::vector<float> image(pixels), truth(pixels);
+  std::vector<float> image(pixels), truth(pixels), input(windows.input_size());
   double sx = 0, sy = 0, sxx = 0, sxy = 0;
   const std::vector<std::uint32_t> chosen = fitted_on(train);
-  std::vector<float> input(windows.input_size());
   for (const std::uint32_t i : chosen) {
     windows.window(i, input);
-    upsampling_(mean_of_channels(array_, shown(input)), image);
+    enlarge(input, image);
     windows.truth(i, truth);
     for (std::size_t p = 0; p < pixels; ++p) {
       sx += image[p];
@@ -121,14 +119,12 @@ UpsampledFrame::UpsampledFrame(const WindowSet& windows, std::span<const std::ui
   }
   const double n = static_cast<double>(chosen.size()) * static_cast<double>(pixels);
   const double variance = sxx - sx * sx / n;
-  slope_ = variance > 1e-12 * n ? (sxy - sx * sy / n) / variance : 0;
-  intercept_ = (sy - slope_ * sx) / n;
-}
-
-void UpsampledFrame::predict(std::span<const float> input, std::span<float> out) const {
-  check_input(input, array_);
-  upsampling_(mean_of_channels(array_, shown(input)), out);
-  for (float& v : out) v = static_cast<float>(slope_ * v + intercept_);
+  const double slope = variance > 1e-12 * n ? (sxy - sx * sy / n) / variance : 0;
+  const double intercept = (sy - slope * sx) / n;
+  return {"bicubic", [=](auto window, auto out) {
+            enlarge(window, out);
+            for (float& v : out) v = static_cast<float>(slope * v + intercept);
+          }};
 }
 
 namespace {
@@ -273,10 +269,8 @@ struct Moments {
 
 }  // namespace
 
-Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train, const FitProgress& progress)
-    : timesteps_(windows.frames()), signals_(windows.array().signals()), pixels_(windows.image().pixels()) {
-  if (train.empty()) throw std::invalid_argument("ridge: there is no window to fit to");
-  const std::vector<std::uint32_t> chosen = evenly_spaced(train, kFitWindows);
+Baseline ridge(const WindowSet& windows, std::span<const std::uint32_t> train, const FitProgress& progress) {
+  const std::vector<std::uint32_t> chosen = fitted_on(train);
   // Whole passes judge the penalty, since neighbours of one pass are nearly the same.
   const auto begins_pass = [&](std::size_t n) {
     return n > 0 && windows.pass_of(chosen[n]) != windows.pass_of(chosen[n - 1]);
@@ -290,9 +284,10 @@ Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train, con
                                   : pass % kHeldOut == std::min(kHeldOut, passes) - 1;
     (held ? judge : fit).push_back(chosen[n]);
   }
-  const std::size_t rows = blocks_of(features_of(timesteps_, signals_));
+  const std::size_t signals = windows.array().signals(), size = windows.frames() * signals,
+                    pixels = windows.image().pixels(), features = features_of(windows.frames(), signals);
   const std::size_t all =
-      blocks_of(fit.size()) + blocks_of(judge.size()) + (3 * std::size(kPenalties) + 2) * rows;
+      blocks_of(fit.size()) + blocks_of(judge.size()) + (3 * std::size(kPenalties) + 2) * blocks_of(features);
   std::size_t done = 0;
   const Look look = [&] {
     ++done;
@@ -300,41 +295,28 @@ Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train, con
   };
   Moments moments(windows, fit, look);
   const Moments other(windows, judge, look);
-  double least = 0;
+  double least = 0, best = 0;
   for (const double penalty : kPenalties) {
     const double error = other.error(moments.solve(penalty, look), look);
-    if (penalty_ == 0 || error < least) {
-      penalty_ = penalty;
-      least = error;
-    }
+    if (best == 0 || error < least) best = penalty, least = error;
   }
-  const std::vector<double> w = (moments += other).solve(penalty_, look);
-  weights_.assign(w.begin(), w.end());
-}
-
-void Ridge::predict(std::span<const float> window, std::span<float> out) const {
-  if (window.size() != timesteps_ * signals_ || out.size() != pixels_) {
-    throw std::invalid_argument("ridge: expects a window [" + std::to_string(timesteps_) + "][" +
-                                std::to_string(signals_) + "] and " + std::to_string(pixels_) +
-                                " pixels, got " + std::to_string(window.size()) + " and " +
-                                std::to_string(out.size()) + " values");
-  }
-  std::vector<double> used(features_of(timesteps_, signals_));
-  fill_features(window, signals_, used);
-  std::fill(out.begin(), out.end(), 0.0f);
-  for (std::size_t f = 0; f < used.size(); ++f) {
-    const float* row = weights_.data() + f * pixels_;
-    for (std::size_t p = 0; p < pixels_; ++p) out[p] += static_cast<float>(used[f]) * row[p];
-  }
+  const std::vector<double> w = (moments += other).solve(best, look);
+  return {"ridge", [=, weights = std::vector<float>(w.begin(), w.end())](auto window, auto out) {
+            check_size("a window", window.size(), size);
+            check_size("the image", out.size(), pixels);
+            std::vector<double> used(features);
+            fill_features(window, signals, used);
+            std::fill(out.begin(), out.end(), 0.0f);
+            for (std::size_t f = 0; f < used.size(); ++f) {
+              const float* row = weights.data() + f * pixels;
+              for (std::size_t p = 0; p < pixels; ++p) out[p] += static_cast<float>(used[f]) * row[p];
+            }
+          }};
 }
 
 Baselines fit_baselines(const WindowSet& windows, std::span<const std::uint32_t> train,
                         const FitProgress& progress) {
-  Baselines baselines;
-  baselines.push_back(std::make_unique<MeanImage>(windows, train));
-  baselines.push_back(std::make_unique<UpsampledFrame>(windows, train));
-  baselines.push_back(std::make_unique<Ridge>(windows, train, progress));
-  return baselines;
+  return {mean_image(windows, train), upsampled_frame(windows, train), ridge(windows, train, progress)};
 }
 
 }  // namespace supertac

@@ -39,10 +39,6 @@ double psnr_db(double mse);
 /// both sides have 11 pixels or more. Throws std::invalid_argument when a side is below 3 or a, b do not hold
 /// height * width pixels.
 double ssim(std::span<const float> a, std::span<const float> b, std::size_t height, std::size_t width);
-inline double ssim(std::span<const float> a, std::span<const float> b, int size) {
-  const std::size_t side = size > 0 ? static_cast<std::size_t>(size) : 0;
-  return ssim(a, b, side, side);
-}
 
 /// How far one image is displaced against another, and how well their structure agrees.
 struct PhaseCorrelation {

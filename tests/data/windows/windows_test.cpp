@@ -49,8 +49,8 @@ TEST(Windows, ShowWhereTheFingerWasTheirDelayAgo) {
   }
   EXPECT_NE(later.fingerprint(), now.fingerprint());
   const std::uint32_t shown[] = {10, 20}, shown_later[] = {10 + kFrames, 20 + kFrames};
-  UpsampledFrame(now, shown).predict(now.raw_window(30), a);
-  UpsampledFrame(later, shown_later).predict(later.raw_window(30 + kFrames), b);
+  upsampled_frame(now, shown).predict(now.raw_window(30), a);
+  upsampled_frame(later, shown_later).predict(later.raw_window(30 + kFrames), b);
   EXPECT_EQ(a, b) << "bicubic interpolation of the frame that is shown";
 }
 
@@ -166,8 +166,8 @@ TEST(Windows, OfAnyArray) {
   std::vector<std::uint32_t> train;
   for (std::uint32_t i = 0; i < set.size(); i += 9) train.push_back(i);
   for (const auto& baseline : fit_baselines(set, train)) {
-    baseline->predict(set.raw_window(0), truth);
-    EXPECT_TRUE(std::isfinite(truth[575])) << baseline->name();
+    baseline.predict(set.raw_window(0), truth);
+    EXPECT_TRUE(std::isfinite(truth[575])) << baseline.name;
   }
 }
 
