@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cstring>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -30,40 +29,32 @@ Sensor at_port(const supertac_sensor& s, const char* port) {
 }  // namespace
 
 supertac_sensor* supertac_sensor_new(const char* path) {
-  return guarded<supertac_sensor*>(nullptr, [&] {
-    expect(path != nullptr, "supertac_sensor_new: path is NULL");
-    return new supertac_sensor{read_sensor(path), nullptr, {}};
-  });
+  return guarded(__func__, {path}, [&] { return new supertac_sensor{read_sensor(path), nullptr, {}}; });
 }
 
 void supertac_sensor_free(supertac_sensor* sensor) { delete sensor; }
 
 int supertac_sensor_describe(const supertac_sensor* sensor, supertac_sensor_description* description) {
-  return guarded(-1, [&] {
-    expect(sensor != nullptr && description != nullptr, "supertac_sensor_describe: a pointer is NULL");
-    expect(description->size >= sizeof(std::size_t), "supertac_sensor_describe: set description.size first");
+  return guarded(__func__, {sensor, description}, [&] {
     const Sensor& s = sensor->sensor;
-    const supertac_sensor_description full{
-        .size = std::min(description->size, sizeof(supertac_sensor_description)),
-        .name = s.name.c_str(),
-        .unit = s.scale.unit.c_str(),
-        .port = s.port.c_str(),
-        .rows = s.array.rows,
-        .columns = s.array.columns,
-        .channels = s.array.channels,
-        .signals = static_cast<int>(s.array.signals()),
-        .pitch_mm = {s.array.pitch_mm.x, s.array.pitch_mm.y},
-        .rate_hz = s.rate_hz,
-        .rest = s.scale.rest,
-        .span = s.scale.span};
-    std::memcpy(description, &full, full.size);
-    return 0;
+    return c::describe(description,
+                       supertac_sensor_description{.size = 0,
+                                                   .name = s.name.c_str(),
+                                                   .unit = s.scale.unit.c_str(),
+                                                   .port = s.port.c_str(),
+                                                   .rows = s.array.rows,
+                                                   .columns = s.array.columns,
+                                                   .channels = s.array.channels,
+                                                   .signals = static_cast<int>(s.array.signals()),
+                                                   .pitch_mm = {s.array.pitch_mm.x, s.array.pitch_mm.y},
+                                                   .rate_hz = s.rate_hz,
+                                                   .rest = s.scale.rest,
+                                                   .span = s.scale.span});
   });
 }
 
 int supertac_sensor_start(supertac_sensor* sensor, const char* port) {
-  return guarded(-1, [&] {
-    expect(sensor != nullptr, "supertac_sensor_start: sensor is NULL");
+  return guarded(__func__, {sensor}, [&] {
     expect(sensor->reader == nullptr, "supertac_sensor_start: it is being read already");
     const Sensor at = at_port(*sensor, port);
     sensor->reader = std::make_unique<SensorReader>(open_port(at), at);
@@ -72,9 +63,7 @@ int supertac_sensor_start(supertac_sensor* sensor, const char* port) {
 }
 
 int supertac_sensor_next(supertac_sensor* sensor, double wait_s, supertac_frame* about, float* signals) {
-  return guarded(-1, [&] {
-    expect(sensor != nullptr && about != nullptr && signals != nullptr,
-           "supertac_sensor_next: a pointer is NULL");
+  return guarded(__func__, {sensor, about, signals}, [&] {
     expect(sensor->reader != nullptr, "supertac_sensor_next: call supertac_sensor_start first");
     expect_within("supertac_sensor_next: wait_s", wait_s, 0, 3600);
     const std::optional<ReadFrame> frame = sensor->reader->next(wait_s);
@@ -87,9 +76,7 @@ int supertac_sensor_next(supertac_sensor* sensor, double wait_s, supertac_frame*
 }
 
 int supertac_sensor_lost(supertac_sensor* sensor, unsigned long long* missing, unsigned long long* dropped) {
-  return guarded(-1, [&] {
-    expect(sensor != nullptr && missing != nullptr && dropped != nullptr,
-           "supertac_sensor_lost: a pointer is NULL");
+  return guarded(__func__, {sensor, missing, dropped}, [&] {
     expect(sensor->reader != nullptr, "supertac_sensor_lost: call supertac_sensor_start first");
     const ReaderCounters counters = sensor->reader->counters();
     *missing = counters.missing, *dropped = counters.dropped;
@@ -98,8 +85,7 @@ int supertac_sensor_lost(supertac_sensor* sensor, unsigned long long* missing, u
 }
 
 const char* supertac_sensor_probe(supertac_sensor* sensor, const char* port, double seconds) {
-  return guarded<const char*>(nullptr, [&] {
-    expect(sensor != nullptr, "supertac_sensor_probe: sensor is NULL");
+  return guarded(__func__, {sensor}, [&] {
     expect(sensor->reader == nullptr, "supertac_sensor_probe: it is being read");
     expect_within("supertac_sensor_probe: seconds", seconds, 0.1, 600);
     const Sensor at = at_port(*sensor, port);

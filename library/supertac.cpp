@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <exception>
 #include <limits>
 #include <optional>
@@ -107,15 +106,11 @@ const char* supertac_version(void) { return SUPERTAC_VERSION; }
 const char* supertac_error(void) { return last_error.c_str(); }
 
 supertac_model* supertac_open(const char* path, int precision) {
-  return guarded<supertac_model*>(nullptr, [&] {
-    expect(path != nullptr, "supertac_open: path is NULL");
-    return opened(load_model(path), precision);
-  });
+  return guarded(__func__, {path}, [&] { return opened(load_model(path), precision); });
 }
 
 supertac_model* supertac_open_memory(const void* bytes, std::size_t size, int precision) {
-  return guarded<supertac_model*>(nullptr, [&] {
-    expect(bytes != nullptr, "supertac_open_memory: bytes is NULL");
+  return guarded(__func__, {bytes}, [&] {
     const std::span file(static_cast<const std::byte*>(bytes), size);
     return opened(model_of(SafetensorsFile::of(file, "model in memory")), precision);
   });
@@ -124,37 +119,32 @@ supertac_model* supertac_open_memory(const void* bytes, std::size_t size, int pr
 void supertac_close(supertac_model* model) { delete model; }
 
 int supertac_describe(const supertac_model* model, supertac_description* description) {
-  return guarded(-1, [&] {
-    expect(model != nullptr && description != nullptr, "supertac_describe: a pointer is NULL");
-    expect(description->size >= sizeof(std::size_t), "supertac_describe: set description.size first");
+  return guarded(__func__, {model, description}, [&] {
     const SuperTacSettings& s = model->file.model->settings();
     const InputSettings& input = model->file.input;
     const Pitch pixel = input.pitch_mm / static_cast<double>(s.scale);
-    const supertac_description full{.size = std::min(description->size, sizeof(supertac_description)),
-                                    .rows = static_cast<int>(s.rows),
-                                    .columns = static_cast<int>(s.columns),
-                                    .channels = static_cast<int>(s.in_channels),
-                                    .signals = static_cast<int>(s.signals()),
-                                    .timesteps = static_cast<int>(s.timesteps),
-                                    .height = static_cast<int>(s.image_height()),
-                                    .width = static_cast<int>(s.image_width()),
-                                    .predicts_error = s.predicted_error ? 1 : 0,
-                                    .rate_hz = input.rate_hz,
-                                    .pitch_mm = {input.pitch_mm.x, input.pitch_mm.y},
-                                    .pixel_mm = {pixel.x, pixel.y},
-                                    .filter_s = input.filter_s.value_or(-1),
-                                    .rest = input.scaling.rest,
-                                    .span = input.scaling.span,
-                                    .delay_s = input.delay_s};
-    std::memcpy(description, &full, full.size);
-    return 0;
+    return c::describe(description, supertac_description{.size = 0,
+                                                         .rows = static_cast<int>(s.rows),
+                                                         .columns = static_cast<int>(s.columns),
+                                                         .channels = static_cast<int>(s.in_channels),
+                                                         .signals = static_cast<int>(s.signals()),
+                                                         .timesteps = static_cast<int>(s.timesteps),
+                                                         .height = static_cast<int>(s.image_height()),
+                                                         .width = static_cast<int>(s.image_width()),
+                                                         .predicts_error = s.predicted_error ? 1 : 0,
+                                                         .rate_hz = input.rate_hz,
+                                                         .pitch_mm = {input.pitch_mm.x, input.pitch_mm.y},
+                                                         .pixel_mm = {pixel.x, pixel.y},
+                                                         .filter_s = input.filter_s.value_or(-1),
+                                                         .rest = input.scaling.rest,
+                                                         .span = input.scaling.span,
+                                                         .delay_s = input.delay_s});
   });
 }
 
 int supertac_draw(const supertac_model* model, std::size_t count, const float* windows, float* pictures,
                   float* predicted_errors, int threads) {
-  return guarded(-1, [&] {
-    expect(model != nullptr, "supertac_draw: model is NULL");
+  return guarded(__func__, {model}, [&] {
     expect(count == 0 || (windows != nullptr && pictures != nullptr),
            "supertac_draw: windows or pictures is NULL");
     expect_within("supertac_draw: threads", threads, 1, 1024);
@@ -187,8 +177,7 @@ int supertac_draw(const supertac_model* model, std::size_t count, const float* w
 }
 
 supertac_live* supertac_live_new(const supertac_model* model, double frame_hz, double filter_s) {
-  return guarded<supertac_live*>(nullptr, [&] {
-    expect(model != nullptr, "supertac_live_new: model is NULL");
+  return guarded(__func__, {model}, [&] {
     expect_within("supertac_live_new: frame_hz", frame_hz, 1, 100'000);
     expect_within("supertac_live_new: filter_s", filter_s, 0, 10);
     const InputSettings& input = model->file.input;
@@ -211,16 +200,14 @@ supertac_live* supertac_live_new(const supertac_model* model, double frame_hz, d
 void supertac_live_free(supertac_live* live) { delete live; }
 
 int supertac_live_push(supertac_live* live, double time_s, const float* frame) {
-  return guarded(-1, [&] {
-    expect(live != nullptr && frame != nullptr, "supertac_live_push: a pointer is NULL");
+  return guarded(__func__, {live, frame}, [&] {
     live->window.push(time_s, std::span(frame, live->model->file.array().signals()));
     return 0;
   });
 }
 
 int supertac_live_picture(supertac_live* live, float* picture, float* predicted_error) {
-  return guarded(-1, [&] {
-    expect(live != nullptr && picture != nullptr, "supertac_live_picture: a pointer is NULL");
+  return guarded(__func__, {live, picture}, [&] {
     if (!live->window.window(live->input.values())) return 0;
     draw(*live->model, live->input, picture, predicted_error);
     return 1;
@@ -228,8 +215,7 @@ int supertac_live_picture(supertac_live* live, float* picture, float* predicted_
 }
 
 supertac_map* supertac_map_new(const supertac_model* model) {
-  return guarded<supertac_map*>(nullptr, [&] {
-    expect(model != nullptr, "supertac_map_new: a pointer is NULL");
+  return guarded(__func__, {model}, [&] {
     const WindowSettings windows = model->file.windows();
     return new supertac_map{model,
                             SurfaceMap(model->file.array().picture(windows.scale), windows.timesteps > 1)};
@@ -240,8 +226,7 @@ void supertac_map_free(supertac_map* map) { delete map; }
 
 int supertac_map_add(supertac_map* map, double x_mm, double y_mm, const float* picture,
                      const float* predicted_error) {
-  return guarded(-1, [&] {
-    expect(map != nullptr && picture != nullptr, "supertac_map_add: a pointer is NULL");
+  return guarded(__func__, {map, picture}, [&] {
     const std::size_t pixels = map->surface.grid().pixels();
     map->surface.add(x_mm, y_mm, std::span(picture, pixels),
                      std::span(predicted_error, predicted_error != nullptr ? pixels : 0));
@@ -251,9 +236,7 @@ int supertac_map_add(supertac_map* map, double x_mm, double y_mm, const float* p
 
 int supertac_map_cells(const supertac_map* map, int* height, int* width, double corner_mm[2], float* values,
                        float* errors) {
-  return guarded(-1, [&] {
-    expect(map != nullptr && height != nullptr && width != nullptr && corner_mm != nullptr,
-           "supertac_map_cells: a pointer is NULL");
+  return guarded(__func__, {map, height, width, corner_mm}, [&] {
     const MapRegion& felt = map->surface.felt();
     const Pitch cell = map->surface.grid().pixel_mm;
     *height = static_cast<int>(felt.height), *width = static_cast<int>(felt.width);
@@ -271,8 +254,7 @@ int supertac_map_cells(const supertac_map* map, int* height, int* width, double 
 }
 
 supertac_pairs* supertac_pairs_open(const supertac_model* model, const char* recordings, long long stride) {
-  return guarded<supertac_pairs*>(nullptr, [&] {
-    expect(model != nullptr && recordings != nullptr, "supertac_pairs_open: a pointer is NULL");
+  return guarded(__func__, {model, recordings}, [&] {
     expect_within("supertac_pairs_open: stride", static_cast<double>(stride), 1, 1e6);
     WindowSettings settings = model->file.windows();
     settings.stride = static_cast<int>(stride);
@@ -288,9 +270,7 @@ std::size_t supertac_pairs_count(const supertac_pairs* pairs) {
 
 int supertac_pairs_read(const supertac_pairs* pairs, std::size_t first, std::size_t count, float* windows,
                         float* truths) {
-  return guarded(-1, [&] {
-    expect(pairs != nullptr && windows != nullptr && truths != nullptr,
-           "supertac_pairs_read: a pointer is NULL");
+  return guarded(__func__, {pairs, windows, truths}, [&] {
     const WindowSet& all = pairs->windows;
     expect(first <= all.size() && count <= all.size() - first,
            "supertac_pairs_read: there are not so many pairs");
@@ -305,8 +285,7 @@ int supertac_pairs_read(const supertac_pairs* pairs, std::size_t first, std::siz
 
 int supertac_train(const char* recipe, const char* recordings, const char* out,
                    const supertac_training* settings, supertac_progress progress, void* user) {
-  return guarded(-1, [&] {
-    expect(recipe != nullptr && recordings != nullptr && out != nullptr, "supertac_train: a pointer is NULL");
+  return guarded(__func__, {recipe, recordings, out}, [&] {
     Recipe wanted = Recipe::named(recipe);
     if (settings != nullptr) {
       expect(settings->size == sizeof(supertac_training), "supertac_train: set settings.size first");

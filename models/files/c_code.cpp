@@ -19,15 +19,9 @@
 namespace supertac {
 namespace {
 
-using Kind = IntegerStep::Kind;
-
 std::string text(Dim value) { return std::to_string(value); }
 
 std::string list(const std::vector<Dim>& values) { return joined(values, ", "); }
-
-std::string call(const std::string& function, const std::vector<std::string>& arguments) {
-  return function + "(" + joined(arguments, ", ") + ")";
-}
 
 // As C has it: 0.05, or 50.0, with all digits that tell it from its neighbours.
 std::string number(double value) {
@@ -58,7 +52,7 @@ class Writer {
   static std::string at(int i) { return "&maps[" + std::to_string(i) + "]"; }
   std::string shape_of(int i) const;
   std::string product(const IntegerStep& s, const std::string& name);
-  std::string call_of(const IntegerStep& s, const std::string& product) const;
+  std::string call_of(const IntegerStep& s) const;
 
   const IntegerPlan& plan_;
   std::map<const IntegerStep*, std::string> names_;
@@ -76,7 +70,8 @@ std::string Writer::maps() const {
   std::string out = "static const struct map maps[] = {\n";
   for (std::size_t i = 0; i < plan_.maps.size(); ++i) {
     const IntegerMap& m = plan_.maps[i];
-    const auto writer = std::ranges::find(plan_.steps, static_cast<int>(i), &IntegerStep::y);
+    const auto writer = std::ranges::find(plan_.steps, static_cast<int>(i),
+                                          [](const IntegerStep& s) { return s.maps.back(); });
     out += "    {" +
            list({m.offset, m.height, m.width, m.channels, m.margin_h, m.margin_w, m.bytes ? 1 : 0,
                  m.bytes ? m.scale.zero : 0}) +
@@ -87,12 +82,12 @@ std::string Writer::maps() const {
 }
 
 std::string Writer::product(const IntegerStep& s, const std::string& name) {
-  const bool bytes = plan_.map(s.x).bytes;
+  const bool bytes = plan_.map(s.maps[0]).bytes;
   const std::vector<std::uint8_t>& w = s.packed;
   const QuantisedProduct& q = s.weights;
   weights_ += w.size() + 8 * q.offset.size();
-  std::string out = "/* " + s.name + ": " + shape_of(s.x) + " -> " + shape_of(s.y) + ", " + text(q.rows) +
-                    " weights an output */\n";
+  std::string out = "/* " + s.name + ": " + shape_of(s.maps[0]) + " -> " + shape_of(s.maps[1]) + ", " +
+                    text(q.rows) + " weights an output */\n";
   constexpr std::size_t kPerLine = 24;
   out += std::string(bytes ? "static const uint8_t " : "static const int8_t ") + name + "_weights[" +
          std::to_string(w.size()) + "] = {";
@@ -116,7 +111,7 @@ std::string Writer::products() {
   std::string out;
   std::set<std::string> taken;
   for (const IntegerStep& s : plan_.steps) {
-    if (s.kind != Kind::product) continue;
+    if (s.packed.empty()) continue;
     const std::string whole = "NAME_" + replaced(s.name, ".", "_");
     std::string name = whole;
     for (int part = 1; !taken.insert(name).second; ++part) name = whole + "_" + std::to_string(part);
@@ -126,27 +121,13 @@ std::string Writer::products() {
   return out;
 }
 
-std::string Writer::call_of(const IntegerStep& s, const std::string& product) const {
-  const std::string scale = list({s.scale.multiplier, s.scale.offset, s.scale.shift});
-  switch (s.kind) {
-    case Kind::input:
-      return call("take_input",
-                  {"from", at(s.y), list({s.runs.first, s.runs.run, s.runs.apart, s.runs.step}), scale});
-    case Kind::to_bytes:
-      return call("to_bytes", {at(s.x), at(s.y), scale});
-    case Kind::product:
-      return call(plan_.map(s.x).bytes ? "product_of_bytes" : "product_of_numbers",
-                  {"&" + product, at(s.x), at(s.y)});
-    case Kind::copy:
-      return call("copy", {at(s.x), at(s.y), text(s.at)});
-    case Kind::mean:
-      return call("mean", {at(s.x), at(s.y)});
-    case Kind::gates:
-      return call("gates", {at(s.x), at(s.y)});
-    case Kind::gated_sum:
-      return call("gated_sum", {at(s.a), at(s.x), s.gates < 0 ? "0" : at(s.gates), at(s.y)});
-  }
-  return {};
+std::string Writer::call_of(const IntegerStep& s) const {
+  std::vector<std::string> arguments;
+  if (s.function == "take_input") arguments.emplace_back("from");
+  if (!s.packed.empty()) arguments.push_back("&" + names_.at(&s));
+  for (const int map : s.maps) arguments.push_back(map < 0 ? "0" : at(map));
+  for (const std::int32_t number : s.numbers) arguments.push_back(std::to_string(number));
+  return s.function + "(" + joined(arguments, ", ") + ")";
 }
 
 std::string Writer::draw() const {
@@ -154,9 +135,8 @@ std::string Writer::draw() const {
       "void NAME_draw(const float from[TIMESTEPS * SIGNALS], float picture[PIXELS], float "
       "predicted_error[PIXELS]) {\n";
   for (const IntegerStep& s : plan_.steps) {
-    if (s.writes_margin) out += "  fill_margin(" + at(s.y) + ");\n";
-    const auto name = names_.find(&s);
-    out += "  " + call_of(s, name == names_.end() ? "" : name->second) + "; /* " + s.name + " */\n";
+    if (s.writes_margin) out += "  fill_margin(" + at(s.maps.back()) + ");\n";
+    out += "  " + call_of(s) + "; /* " + s.name + " */\n";
   }
   out += "  give(" + at(plan_.picture) + ", picture);\n";
   if (plan_.predicted_error >= 0)

@@ -38,7 +38,9 @@ ChainLink int8_link(const SafetensorsFile& file, const ModelFile& model) {
     add(sum, s.packed);
     for (const auto* numbers : {&s.weights.offset, &s.weights.multiplier, &s.weights.shift})
       add(sum, *numbers);
-    add(sum, std::vector{s.scale.multiplier, s.scale.offset, s.scale.shift, s.negative_slope});
+    const auto& n = s.numbers;
+    add(sum, n.size() < 3 ? std::vector{1, 0, 0} : std::vector(n.end() - 3, n.end()));  // multiplier, ...
+    add(sum, std::vector{s.negative_slope});
   }
   return {"int8", sum.hex()};
 }

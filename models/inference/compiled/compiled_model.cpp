@@ -25,17 +25,25 @@ Estimate CompiledModel::estimate(const Tensor& inputs) const {
   if (inputs.rank() < 1 || inputs.shape() != network_->input_shape(inputs.dim(0)))
     refuse("CompiledModel", "inputs", "[N" + network_->input_shape(0).text().substr(2),
            inputs.shape().text());
-  return integers_ ? integers_->run(inputs) : plan_->run(inputs);
+  const SuperTacSettings& settings = network_->settings();
+  Estimate out;
+  out.picture = Tensor(network_->picture_shape(inputs.dim(0)));
+  if (settings.predicted_error) out.predicted_error = Tensor(out.picture.shape());
+  if (settings.latents() > 0) out.latents = Tensor(Shape{inputs.dim(0), settings.latents()});
+  integers_ ? integers_->run(inputs, out) : plan_->run(inputs, out);
+  return out;
 }
 
 std::shared_ptr<const Plan> Compiler::plan(const SuperTac& network) {
   const TracedPrediction traced(network, Tensor::zeros(network.input_shape(1)));
   const Prediction& drawn = traced.drawn;
   Compiler compiler(traced);
-  Plan& plan = *compiler.plan_;
-  plan.picture_ = compiler.map_of(drawn.picture);
-  if (drawn.predicted_error.defined()) plan.predicted_error_ = compiler.map_of(drawn.predicted_error);
-  if (drawn.latents.defined()) plan.latents_ = compiler.map_of(drawn.latents);
+  const std::pair<const Variable&, Tensor Estimate::*> outputs[] = {
+      {drawn.picture, &Estimate::picture},
+      {drawn.predicted_error, &Estimate::predicted_error},
+      {drawn.latents, &Estimate::latents}};
+  for (const auto& [y, to] : outputs)
+    if (y.defined()) compiler.plan_->outputs_.emplace_back(compiler.map_of(y), to);
   return compiler.plan_;
 }
 
@@ -101,13 +109,8 @@ void Plan::copy_out(const Block& block, const FeatureMap& map, Tensor& to, Dim f
   }
 }
 
-Estimate Plan::run(const Tensor& inputs) const {
+void Plan::run(const Tensor& inputs, Estimate& out) const {
   const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
-  Estimate out{.picture = Tensor(Shape{count, picture_.height, picture_.width, 1}),
-               .predicted_error = {},
-               .latents = {}};
-  if (predicted_error_) out.predicted_error = Tensor(out.picture.shape());
-  if (latents_) out.latents = Tensor(Shape{count, latents_->channels});
   const Dim images = std::min(count, kBlock);
   Tensor memory(Shape{scratch_ + workspace_ * images});
   real* const workspace = memory.data() + scratch_;
@@ -116,11 +119,8 @@ Estimate Plan::run(const Tensor& inputs) const {
                       memory.data()};
     if (first == 0 || block.images != kBlock) clear_margins(block);
     for (const PlanStep& step : steps_) step(block);
-    copy_out(block, picture_, out.picture, first);
-    if (predicted_error_) copy_out(block, *predicted_error_, out.predicted_error, first);
-    if (latents_) copy_out(block, *latents_, out.latents, first);
+    for (const auto& [map, to] : outputs_) copy_out(block, map, out.*to, first);
   }
-  return out;
 }
 
 static double square(real x) { return static_cast<double>(x) * static_cast<double>(x); }

@@ -6,8 +6,8 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "autograd/kernels/fast/inference.h"
@@ -38,8 +38,8 @@ using PlanStep = std::function<void(const Block&)>;
 /// for one image; a block of n images has n of each map, one behind the other, and every run takes its own.
 class Plan {
  public:
-  /// inputs as SuperTac::estimate(), which is not checked.
-  Estimate run(const Tensor& inputs) const;
+  /// Draws what `out` has room for. Inputs as SuperTac::estimate(), which is not checked.
+  void run(const Tensor& inputs, Estimate& out) const;
 
  private:
   friend class Compiler;
@@ -56,8 +56,7 @@ class Plan {
   std::vector<FeatureMap> planes_;   // those with margins inside: of one image, channel by channel
   Dim workspace_ = 0;                // numbers of an image, in all maps
   Dim scratch_ = 0;                  // numbers, of the step that needs the most
-  FeatureMap picture_;
-  std::optional<FeatureMap> predicted_error_, latents_;
+  std::vector<std::pair<FeatureMap, Tensor Estimate::*>> outputs_;
 };
 
 /// One step for each op, in the order in which they ran; a map's memory is reused behind its last reader.

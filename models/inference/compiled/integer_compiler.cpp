@@ -82,7 +82,8 @@ QuantisedProduct quantise(Dim rows, std::span<const real> w, std::span<const rea
   return q;
 }
 
-Requantise requantise(double from_step, double to_step) {
+// {multiplier, offset, shift}
+std::vector<std::int32_t> requantise(double from_step, double to_step) {
   constexpr int kBits = 14;
   const double target = from_step / to_step;
   int exponent = 0;
@@ -92,7 +93,6 @@ Requantise requantise(double from_step, double to_step) {
   return {static_cast<std::int32_t>(multiplier), 1 << (shift - 1), shift};
 }
 
-using Kind = IntegerStep::Kind;
 constexpr Dim kFour = 4;  // bytes, and outputs, that kernels.c multiplies together
 
 class IntegerCompiler : TraceWalk {
@@ -112,7 +112,8 @@ class IntegerCompiler : TraceWalk {
   int new_map(const Variable& y, bool bytes);
   IntegerMap& map(int i) { return plan_->maps[static_cast<std::size_t>(i)]; }
   int numbers_of(const Variable& x) const { return numbers_.at(owner(x)); }
-  IntegerStep& add(Kind kind, std::string name, int x, int y);
+  IntegerStep& add(std::string function, std::string name, std::vector<int> maps,
+                   std::vector<std::int32_t> numbers = {});
   void add_product(const TracedOp& op, int x, int y, ProductTaps taps);
   void add_bytes(const Variable& y);
   void release(std::size_t op);
@@ -198,12 +199,12 @@ void IntegerCompiler::release(std::size_t op) {
   std::erase_if(live_, [&](int i) { return !read_after(value_of_.at(i), op); });
 }
 
-IntegerStep& IntegerCompiler::add(Kind kind, std::string name, int x, int y) {
-  IntegerStep step;
-  step.kind = kind, step.name = std::move(name), step.x = x, step.y = y;
-  step.writes_margin = written_.insert(y).second && map(y).margin_h + map(y).margin_w > 0;
-  plan_->steps.push_back(std::move(step));
-  return plan_->steps.back();
+IntegerStep& IntegerCompiler::add(std::string function, std::string name, std::vector<int> maps,
+                                  std::vector<std::int32_t> numbers) {
+  const int y = maps.back();
+  const bool writes_margin = written_.insert(y).second && map(y).margin_h + map(y).margin_w > 0;
+  return plan_->steps.emplace_back(
+      IntegerStep{std::move(function), std::move(name), std::move(maps), std::move(numbers), writes_margin});
 }
 
 std::string IntegerCompiler::layer_of(const TracedOp& op) const {
@@ -224,18 +225,17 @@ void IntegerCompiler::make(const TracedOp& op) {
     for (ProductTaps& taps : products_of(op, map(x), map(y))) add_product(op, x, y, std::move(taps));
     if (bytes_out) return;
   } else if (op.op == "unflatten_channels_first") {
-    add(Kind::copy, "unflatten", numbers_of(op.inputs[0]), new_map(op.y, false));
+    add("copy", "unflatten", {numbers_of(op.inputs[0]), new_map(op.y, false)}, {0});
   } else if (op.op == "concat") {
     concat(op, new_map(op.y, false));
   } else if (op.op == "global_mean") {
-    add(Kind::mean, "mean over the pixels", numbers_of(op.inputs[0]), new_map(op.y, false));
+    add("mean", "mean over the pixels", {numbers_of(op.inputs[0]), new_map(op.y, false)});
   } else if (op.op == "sigmoid" && op.y.rank() == 2) {
-    add(Kind::gates, "sigmoid", numbers_of(op.inputs[0]), new_map(op.y, false));
+    add("gates", "sigmoid", {numbers_of(op.inputs[0]), new_map(op.y, false)});
   } else if (op.op == "gated_sum" || op.op == "add") {
-    IntegerStep& step = add(Kind::gated_sum, op.op == "add" ? "sum" : "gated sum", numbers_of(op.inputs[1]),
-                            new_map(op.y, false));
-    step.a = numbers_of(op.inputs[0]);
-    if (op.op == "gated_sum") step.gates = numbers_of(op.inputs[2]);
+    const int gates = op.op == "add" ? -1 : numbers_of(op.inputs[2]);
+    add("gated_sum", op.op == "add" ? "sum" : "gated sum",
+        {numbers_of(op.inputs[0]), numbers_of(op.inputs[1]), gates, new_map(op.y, false)});
   } else {
     throw std::logic_error("CompiledModel: no step in whole numbers computes the op " + std::string(op.op));
   }
@@ -245,27 +245,31 @@ void IntegerCompiler::make(const TracedOp& op) {
 void IntegerCompiler::add_bytes(const Variable& y) {
   if (!as_bytes(y.node())) return;
   const int x = numbers_.at(y.node()), to = new_map(y, true);
-  add(Kind::to_bytes, "to bytes", x, to).scale = requantise(map(x).scale.step, map(to).scale.step);
+  add("to_bytes", "to bytes", {x, to}, requantise(map(x).scale.step, map(to).scale.step));
 }
 
 void IntegerCompiler::take_input(const TracedOp& op) {
   const Variable& y = op.y;
   const bool bytes = as_bytes(y.node()) && !as_numbers(y.node());
   const int to = new_map(y, bytes);
-  IntegerStep& step = add(Kind::input, "input", -1, to);
-  step.runs = InputRuns::of(op);
-  if (bytes) step.scale = requantise(plan_->number_step(), map(to).scale.step);
+  const InputRuns runs = InputRuns::of(op);
+  std::vector<std::int32_t> numbers;
+  for (const Dim number : {runs.first, runs.run, runs.apart, runs.step})
+    numbers.push_back(static_cast<std::int32_t>(number));
+  const std::vector<std::int32_t> scale =
+      bytes ? requantise(plan_->number_step(), map(to).scale.step) : std::vector{1, 0, 0};
+  numbers.insert(numbers.end(), scale.begin(), scale.end());
+  add("take_input", "input", {to}, numbers);
   if (!bytes) add_bytes(y);
 }
 
 void IntegerCompiler::concat(const TracedOp& op, int y) {
-  Dim at = 0;
+  if (op.y.rank() > 2) throw std::logic_error("CompiledModel: a concat of maps has no step in whole numbers");
+  std::int32_t at = 0;
   for (const Variable& input : op.inputs) {
     const int x = numbers_of(input);
-    if (op.y.rank() > 2)
-      throw std::logic_error("CompiledModel: a concat of maps has no step in whole numbers");
-    add(Kind::copy, "concat", x, y).at = at;
-    at += map(x).channels;
+    add("copy", "concat", {x, y}, {at});
+    at += static_cast<std::int32_t>(map(x).channels);
   }
 }
 
@@ -288,7 +292,7 @@ void IntegerCompiler::add_product(const TracedOp& op, int x, int y, ProductTaps 
   if (slope != IntegerStep::kNoSlope && (slope < 0 || slope > 63))
     throw std::logic_error("CompiledModel: a negative slope of " +
                            std::to_string(op.settings.negative_slope) + " has no step in whole numbers");
-  IntegerStep& s = add(Kind::product, layer_of(op), x, y);
+  IntegerStep& s = add(map(x).bytes ? "product_of_bytes" : "product_of_numbers", layer_of(op), {x, y});
   const Dim rows = static_cast<Dim>(t.segments.size()) * t.length;
   s.weights = quantise(rows, t.w.values(), t.bias.values(), map(x).scale, map(y).scale);
   s.packed = packed(s.weights, map(x).bytes);

@@ -3,7 +3,9 @@
 #include <string.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <stdexcept>
 
 namespace supertac {
@@ -13,6 +15,7 @@ namespace c99 {
 
 static thread_local std::uint8_t* work = nullptr;
 static thread_local float number_step = 1;
+static thread_local const float* input = nullptr;
 
 #define WORK work
 #define NUMBER_STEP number_step
@@ -22,12 +25,14 @@ static thread_local float number_step = 1;
 
 }  // namespace c99
 
-struct IntegerPlan::Compiled {
-  std::vector<c99::map> maps;
-  std::vector<std::vector<c99::outcome>> outcomes;
-  std::vector<c99::product> products;  // of each step; empty for those that are none
-
-  const c99::map* map(int i) const { return i < 0 ? nullptr : &maps[static_cast<std::size_t>(i)]; }
+// A step with what its function is given.
+struct IntegerCall {
+  void (*function)(const IntegerCall&) = nullptr;
+  const c99::map* margin = nullptr;  // to be filled before
+  std::vector<c99::outcome> outcomes = {};
+  c99::product product = {};
+  std::array<const c99::map*, 4> maps = {};
+  std::array<std::int32_t, 7> numbers = {};
 };
 
 namespace {
@@ -41,7 +46,7 @@ Whole narrow(Dim value) {
                            "; train a network of fewer channels, or for a smaller array");
 }
 
-c99::map compiled(const IntegerMap& m) {
+c99::map c99_map(const IntegerMap& m) {
   return {.offset = narrow<std::int32_t>(m.offset),
           .height = narrow<std::int16_t>(m.height),
           .width = narrow<std::int16_t>(m.width),
@@ -59,7 +64,7 @@ std::vector<c99::outcome> outcomes(const QuantisedProduct& q) {
   return all;
 }
 
-c99::product compiled(const IntegerStep& s, const std::vector<c99::outcome>& outcomes) {
+c99::product c99_product(const IntegerStep& s, const std::vector<c99::outcome>& outcomes) {
   const ProductTaps& t = s.taps;
   c99::product p{.weights = s.packed.data(),
                  .outcomes = outcomes.data(),
@@ -81,50 +86,52 @@ c99::product compiled(const IntegerStep& s, const std::vector<c99::outcome>& out
   return p;
 }
 
-void run_step(const IntegerStep& s, const c99::product& product, const real* input, const c99::map* x,
-              const c99::map* a, const c99::map* gate, const c99::map* y) {
-  using Kind = IntegerStep::Kind;
-  const auto& [multiplier, offset, shift] = s.scale;
-  const auto whole = [](Dim value) { return static_cast<std::int32_t>(value); };
-  if (s.writes_margin) c99::fill_margin(y);
-  switch (s.kind) {
-    case Kind::input:
-      return c99::take_input(input, y, whole(s.runs.first), whole(s.runs.run), whole(s.runs.apart),
-                             whole(s.runs.step), multiplier, offset, shift);
-    case Kind::to_bytes:
-      return c99::to_bytes(x, y, multiplier, offset, shift);
-    case Kind::product:
-      return x->bytes != 0 ? c99::product_of_bytes(&product, x, y) : c99::product_of_numbers(&product, x, y);
-    case Kind::copy:
-      return c99::copy(x, y, whole(s.at));
-    case Kind::mean:
-      return c99::mean(x, y);
-    case Kind::gates:
-      return c99::gates(x, y);
-    case Kind::gated_sum:
-      return c99::gated_sum(a, x, gate, y);
-  }
-}
+const std::map<std::string, decltype(IntegerCall::function)> kFunctions{
+    {"take_input",
+     [](const IntegerCall& c) {
+       const auto& [first, run, apart, step, multiplier, offset, shift] = c.numbers;
+       c99::take_input(c99::input, c.maps[0], first, run, apart, step, multiplier, offset, shift);
+     }},
+    {"to_bytes",
+     [](const IntegerCall& c) {
+       c99::to_bytes(c.maps[0], c.maps[1], c.numbers[0], c.numbers[1], c.numbers[2]);
+     }},
+    {"product_of_bytes",
+     [](const IntegerCall& c) { c99::product_of_bytes(&c.product, c.maps[0], c.maps[1]); }},
+    {"product_of_numbers",
+     [](const IntegerCall& c) { c99::product_of_numbers(&c.product, c.maps[0], c.maps[1]); }},
+    {"copy", [](const IntegerCall& c) { c99::copy(c.maps[0], c.maps[1], c.numbers[0]); }},
+    {"mean", [](const IntegerCall& c) { c99::mean(c.maps[0], c.maps[1]); }},
+    {"gates", [](const IntegerCall& c) { c99::gates(c.maps[0], c.maps[1]); }},
+    {"gated_sum", [](const IntegerCall& c) { c99::gated_sum(c.maps[0], c.maps[1], c.maps[2], c.maps[3]); }}};
 
 }  // namespace
 
+struct IntegerPlan::Compiled {
+  std::vector<c99::map> maps;
+  std::vector<IntegerCall> calls;
+
+  const c99::map* map(int i) const { return i < 0 ? nullptr : &maps[static_cast<std::size_t>(i)]; }
+};
+
 void IntegerPlan::compile() {
   auto all = std::make_shared<Compiled>();
-  for (const IntegerMap& m : maps) all->maps.push_back(compiled(m));
-  for (const IntegerStep& s : steps) all->outcomes.push_back(outcomes(s.weights));
-  for (std::size_t i = 0; i < steps.size(); ++i)
-    all->products.push_back(compiled(steps[i], all->outcomes[i]));
+  for (const IntegerMap& m : maps) all->maps.push_back(c99_map(m));
+  for (const IntegerStep& s : steps) {
+    IntegerCall& call = all->calls.emplace_back(IntegerCall{.function = kFunctions.at(s.function)});
+    if (s.writes_margin) call.margin = all->map(s.maps.back());
+    call.outcomes = outcomes(s.weights);
+    call.product = c99_product(s, call.outcomes);
+    std::ranges::transform(s.maps, call.maps.begin(), [&](int m) { return all->map(m); });
+    std::ranges::copy(s.numbers, call.numbers.begin());
+  }
   compiled_ = all;
 }
 
 float IntegerPlan::number_step() const { return std::ldexp(1.0F, -fraction_bits); }
 
-Estimate IntegerPlan::run(const Tensor& inputs) const {
+void IntegerPlan::run(const Tensor& inputs, Estimate& out) const {
   const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
-  Estimate out;
-  out.picture = Tensor(Shape{count, map(picture).height, map(picture).width, 1});
-  if (predicted_error >= 0) out.predicted_error = Tensor(out.picture.shape());
-  if (latents >= 0) out.latents = Tensor(Shape{count, map(latents).channels});
   Tensor memory(Shape{work_area / static_cast<Dim>(sizeof(real)) + 1});
   c99::work = reinterpret_cast<std::uint8_t*>(memory.data());
   c99::number_step = number_step();
@@ -133,16 +140,15 @@ Estimate IntegerPlan::run(const Tensor& inputs) const {
     const auto give = [&](int i, Tensor& to) {
       if (i >= 0) c99::give(all.map(i), to.data() + n * (to.size() / count));
     };
-    for (std::size_t i = 0; i < steps.size(); ++i) {
-      const IntegerStep& s = steps[i];
-      run_step(s, all.products[i], inputs.data() + n * size, all.map(s.x), all.map(s.a), all.map(s.gates),
-               all.map(s.y));
+    c99::input = inputs.data() + n * size;
+    for (const IntegerCall& call : all.calls) {
+      if (call.margin != nullptr) c99::fill_margin(call.margin);
+      call.function(call);
     }
     give(picture, out.picture);
     give(predicted_error, out.predicted_error);
     give(latents, out.latents);
   }
-  return out;
 }
 
 }  // namespace supertac

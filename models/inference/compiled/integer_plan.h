@@ -37,32 +37,24 @@ struct QuantisedProduct {
   std::vector<std::int32_t> multiplier, offset, shift;
 };
 
-/// From numbers of one scale, up to 16 bits, to another one: ((x * multiplier + offset) >> shift) + zero of
-/// the other one.
-struct Requantise {
-  std::int32_t multiplier = 1, offset = 0, shift = 0;
-};
-
+/// A call of a function of kernels.c:
+///   take_input(input, y, InputRuns, multiplier, offset, shift)   y = runs of the network's input
+///   to_bytes(x, y, multiplier, offset, shift)                    y = x in another scale
+///   product_of_bytes(product, x, y), product_of_numbers(...)     a convolution or linear layer, or every
+///                                                                second pixel of a transposed convolution
+///   copy(x, y, channel)                                          y, from a channel on, = x without margin
+///   mean(x, y)                                                   y = mean over the pixels of x
+///   gates(x, y)                                                  y = sigmoid(x), in 4096ths
+///   gated_sum(a, x, gates, y)                                    y = a + x * gates, or a + x
+/// To another scale a number, up to 16 bits, becomes ((x * multiplier + offset) >> shift) + its zero.
 struct IntegerStep {
-  enum class Kind {
-    input,      ///< y = runs of the network's input
-    to_bytes,   ///< y = x in another scale
-    product,    ///< a convolution or linear layer, or every second pixel of a transposed convolution
-    copy,       ///< y, from channel `at` on, = x without its margin
-    mean,       ///< y = mean over the pixels of x
-    gates,      ///< y = sigmoid(x), in 4096ths
-    gated_sum,  ///< y = a + x * gates, or a + x
-  };
-  Kind kind = Kind::copy;
-  std::string name;                        ///< "encoder.0.conv.1", or what it computes
-  int x = -1, a = -1, gates = -1, y = -1;  ///< maps
-  bool writes_margin = false;              ///< the first step that writes y: its margin is filled before
+  std::string function, name;              ///< "encoder.0.conv.1", or what it computes
+  std::vector<int> maps = {};              ///< that it is given, -1: none; it writes the last one
+  std::vector<std::int32_t> numbers = {};  ///< that it is given behind the maps
+  bool writes_margin = false;              ///< the first step that writes a map: its margin is filled before
 
-  Requantise scale = {};  ///< input, to_bytes
-  InputRuns runs = {};    ///< input
-  Dim at = 0;             ///< copy
-
-  ProductTaps taps = {};                   // product: all but w and bias
+  // Of a product:
+  ProductTaps taps = {};                   // all but w and bias
   QuantisedProduct weights = {};           // [segments * length][cout]
   std::int32_t negative_slope = kNoSlope;  // of 4096
   /// The weights as kernels.c takes them: of bytes w + 128, [cout / 4][rows / 4][4 outputs][4], filled up to
@@ -76,8 +68,8 @@ struct IntegerPlan {
   /// Throws std::logic_error naming an op that has no step, std::invalid_argument for the ranges of another
   /// network, std::runtime_error for a layer that kernels.c cannot count in 16 bits.
   static std::shared_ptr<const IntegerPlan> of(const SuperTac& network, const ActivationRanges& ranges);
-  /// Throws nothing; inputs as SuperTac::estimate.
-  Estimate run(const Tensor& inputs) const;
+  /// Draws what `out` has room for; inputs as SuperTac::estimate, which is not checked.
+  void run(const Tensor& inputs, Estimate& out) const;
   float number_step() const;
   const IntegerMap& map(int i) const { return maps[static_cast<std::size_t>(i)]; }
 
@@ -88,7 +80,7 @@ struct IntegerPlan {
   int picture = -1, predicted_error = -1, latents = -1;  ///< maps; -1: the network has none
 
  private:
-  struct Compiled;  // maps and products as kernels.c has them
+  struct Compiled;  // the steps with arguments as kernels.c has them
   void compile();
 
   std::shared_ptr<const Compiled> compiled_;
