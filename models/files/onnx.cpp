@@ -125,7 +125,7 @@ std::string Exporter::normalised_per_window(const std::string& x, const Scaling&
 std::string Exporter::network_input(const ModelFile& file) {
   const SuperTacSettings& s = file.model->settings();
   graph.input(
-      "volts", {"N", s.timesteps, s.signals()},
+      "volts", Ints{s.timesteps, s.signals()},
       "Volts of every signal, oldest sample first; taxel k lies in row k / columns, column k % columns.");
   const std::string x = scaled(file);
   return file.input.scaling.per_window ? normalised_per_window(x, file.input.scaling, s.timesteps) : x;
@@ -219,7 +219,7 @@ std::string Exporter::made(const TracedOp& op) {
 
 void Exporter::output(const char* name, const Variable& y, const char* about) {
   graph.node("Reshape", {of(y), numbers({-1, y.dim(1), y.dim(2)})}, name);
-  graph.output(name, {"N", y.dim(1), y.dim(2)}, about);
+  graph.output(name, Ints{y.dim(1), y.dim(2)}, about);
 }
 
 std::string Exporter::picture_of(const ModelFile& file) {

@@ -54,15 +54,14 @@ WireMessage message_of(const OnnxAttribute& a) {
   return out;
 }
 
-WireMessage value_info(const std::string& name, const std::vector<OnnxSize>& sizes,
+WireMessage value_info(const std::string& name, std::span<const std::int64_t> sizes,
                        const std::string& about) {
-  WireMessage shape, tensor, type, out;
-  for (const OnnxSize& size : sizes) {
+  WireMessage shape, free_size, tensor, type, out;
+  free_size.bytes(value::dim_name, "N");
+  shape.message(value::dim, free_size);
+  for (const std::int64_t size : sizes) {
     WireMessage dim;
-    if (const auto* number = std::get_if<std::int64_t>(&size))
-      dim.integer(value::dim_value, *number);
-    else
-      dim.bytes(value::dim_name, std::get<std::string>(size));
+    dim.integer(value::dim_value, size);
     shape.message(value::dim, dim);
   }
   tensor.integer(value::element_type, static_cast<std::int64_t>(OnnxType::f32));
@@ -131,13 +130,14 @@ std::string OnnxGraph::constant(const std::string& name, std::span<const std::in
   return constant(name, OnnxType::i64, shape, std::as_bytes(values));
 }
 
-void OnnxGraph::input(const std::string& name, const std::vector<OnnxSize>& shape, const std::string& about) {
-  ends_.message(graph::input, value_info(name, shape, about));
+void OnnxGraph::input(const std::string& name, std::span<const std::int64_t> sizes,
+                      const std::string& about) {
+  ends_.message(graph::input, value_info(name, sizes, about));
 }
 
-void OnnxGraph::output(const std::string& name, const std::vector<OnnxSize>& shape,
+void OnnxGraph::output(const std::string& name, std::span<const std::int64_t> sizes,
                        const std::string& about) {
-  ends_.message(graph::output, value_info(name, shape, about));
+  ends_.message(graph::output, value_info(name, sizes, about));
 }
 
 std::string OnnxGraph::file(const std::string& producer_version, const std::string& about,

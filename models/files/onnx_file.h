@@ -34,9 +34,6 @@ struct OnnxAttribute {
   std::variant<std::int64_t, float, std::vector<std::int64_t>> value;
 };
 
-/// A size of an input or output: a number, or the name of one that is free.
-using OnnxSize = std::variant<std::int64_t, std::string>;
-
 /// A graph of ops over named arrays, in the order in which they run.
 class OnnxGraph {
  public:
@@ -49,8 +46,9 @@ class OnnxGraph {
   std::string constant(const std::string& name, std::span<const std::int64_t> shape,
                        std::span<const std::int64_t> values);
 
-  void input(const std::string& name, const std::vector<OnnxSize>& shape, const std::string& about);
-  void output(const std::string& name, const std::vector<OnnxSize>& shape, const std::string& about);
+  // [N, sizes], N being any number.
+  void input(const std::string& name, std::span<const std::int64_t> sizes, const std::string& about);
+  void output(const std::string& name, std::span<const std::int64_t> sizes, const std::string& about);
 
   /// The file's bytes; the same graph gives the same bytes.
   std::string file(const std::string& producer_version, const std::string& about,

@@ -29,8 +29,9 @@ class Ranks {
   int size() const { return size_; }
   bool first() const { return rank_ == 0; }
 
-  /// Sends `mine` and fills `theirs`; the partner calls it with sizes the other way round.
-  virtual void exchange(int partner, std::span<const std::byte> mine, std::span<std::byte> theirs) = 0;
+  /// Sends `mine` and fills `theirs`; the partner calls it with sizes the other way round. A process that is
+  /// alone has no partner.
+  virtual void exchange(int, std::span<const std::byte>, std::span<std::byte>) {}
 
   /// The texts of all ranks, by rank. For sizes that are powers of two.
   std::vector<std::string> gather(const std::string& mine);

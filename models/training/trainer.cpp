@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "autograd/kernels/fast/each.h"
@@ -123,11 +124,9 @@ Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Obj
 Trainer::MicroBatch::MicroBatch(const Objective& master, Dim first_sample, Dim count)
     : first(first_sample),
       objective(master.clone()),
-      batch{Tensor(master.network().input_shape(count)), Tensor(master.network().picture_shape(count)), {}} {
+      batch{Tensor(master.network().input_shape(count)), Tensor(master.network().picture_shape(count)), {}},
+      statistics(master) {
   if (master.noise() > 0) batch.noise = Tensor(Shape{count, master.noise()});
-  variances.pictures = variances.targets =
-      BatchVariance(static_cast<std::size_t>(batch.targets.size() / count));
-  variances.means = BatchVariance(static_cast<std::size_t>(master.latents()));
   const auto &of_master = master.network().parameters(), &own = objective.network().parameters();
   for (std::size_t i = 0; i < own.size(); ++i)
     Variable(own[i].value).mutable_value() = of_master[i].value.value();  // the same buffer
@@ -174,16 +173,18 @@ void Trainer::run(MicroBatch& micro_batch) const {
   const BatchOutput output = micro_batch.objective(micro_batch.batch);
   const double share =
       static_cast<double>(micro_batch.batch.inputs.dim(0)) / static_cast<double>(indices_.size());
-  micro_batch.terms = terms_of(output.loss, share);
-  micro_batch.variances.clear();
-  micro_batch.variances.pictures.add(output.picture.value());
-  micro_batch.variances.targets.add(micro_batch.batch.targets);
+  LossTerms terms = terms_of(output.loss, share);
+  Statistics& statistics = micro_batch.statistics;
+  std::ranges::fill(statistics.values, 0);
+  std::ranges::transform(terms.all(), statistics.terms().begin(), [](const double* term) { return *term; });
+  statistics.pictures().add(output.picture.value());
+  statistics.targets().add(micro_batch.batch.targets);
   std::size_t first = 0;
   for (const Variable& mean : output.means.span()) {  // [n,LD] of each group
-    micro_batch.variances.means.add(mean.value(), first);
+    statistics.means().add(mean.value(), first);
     first += static_cast<std::size_t>(mean.dim(1));
   }
-  if (std::isfinite(micro_batch.terms.total)) return backward(static_cast<real>(share) * output.loss.total);
+  if (std::isfinite(terms.total)) return backward(static_cast<real>(share) * output.loss.total);
   micro_batch.trouble = where_not_finite(output.loss.total, parameters);
 }
 
@@ -225,39 +226,25 @@ StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMi
   return report;
 }
 
-void Trainer::Variances::clear() {
-  for (BatchVariance* variance : all()) variance->clear();
-}
+Trainer::Statistics::Statistics(const Objective& objective)
+    : pixels(static_cast<std::size_t>(objective.network().picture_shape(1).elements())),
+      values(6 + 4 * pixels + 2 * static_cast<std::size_t>(objective.latents())) {}
 
-void Trainer::Variances::add(const Variances& other) {
-  pictures.add(other.pictures), targets.add(other.targets), means.add(other.means);
-}
-
-// Adds up loss terms and variances of micro-batches, then of processes, as balanced binary trees;
-// Trainer::apply() adds the gradients.
+// Of micro-batches, then of processes, as balanced binary trees; Trainer::apply() adds the gradients.
 void Trainer::add_up_statistics(StepReport& report) {
   for (std::size_t apart = 1; apart < micro_batches_.size(); apart *= 2) {
     for (std::size_t micro_batch = 0; micro_batch + apart < micro_batches_.size(); micro_batch += 2 * apart) {
-      micro_batches_[micro_batch].terms.add(micro_batches_[micro_batch + apart].terms);
-      micro_batches_[micro_batch].variances.add(micro_batches_[micro_batch + apart].variances);
+      std::vector<double>& sum = micro_batches_[micro_batch].statistics.values;
+      const std::vector<double>& more = micro_batches_[micro_batch + apart].statistics.values;
+      std::ranges::transform(sum, more, sum.begin(), std::plus());
     }
   }
-  MicroBatch& sum = micro_batches_.front();
-  if (ranks_.size() > 1) {
-    const auto each = [&](const std::function<void(double&)>& use) {
-      for (double* term : sum.terms.all()) use(*term);
-      for (BatchVariance* variance : sum.variances.all())
-        for (double& value : variance->values()) use(value);
-    };
-    statistics_.assign(1, report.stop ? 1 : 0);
-    each([&](double& value) { statistics_.push_back(value); });
-    of_partner_.resize(statistics_.size());
-    ranks_.add_up(statistics_, of_partner_);
-    report.stop = statistics_[0] > 0;
-    std::size_t next = 1;
-    each([&](double& value) { value = statistics_[next++]; });
-  }
-  report.add(sum.terms);
+  Statistics& sum = micro_batches_.front().statistics;
+  sum.values[0] = report.stop ? 1 : 0;
+  of_partner_.resize(sum.values.size());
+  ranks_.add_up(sum.values, of_partner_);
+  report.stop = sum.values[0] > 0;
+  for (std::size_t i = 0; i < sum.terms().size(); ++i) *report.all()[i] = sum.terms()[i];
 }
 
 void Trainer::check_finite(const LossTerms& t) const {
@@ -274,12 +261,12 @@ void Trainer::check_finite(const LossTerms& t) const {
 }
 
 void Trainer::look_for_collapse(StepReport& report) {
-  const Variances& variances = micro_batches_.front().variances;
+  Statistics& sums = micro_batches_.front().statistics;
   if (indices_.size() < 2) return;  // nothing to compare with
   const auto samples = static_cast<double>(indices_.size());
-  report.active_latents = active_latents(variances.means, samples);
+  report.active_latents = active_latents(sums.means(), samples);
   const bool idle = objective_.latents() > 0 && report.active_latents == 0;
-  const bool flat = idle || is_degenerate(variances.pictures, variances.targets, samples);
+  const bool flat = idle || is_degenerate(sums.pictures(), sums.targets(), samples);
   flat_steps_ = flat && step_ >= schedule_.warm_up ? flat_steps_ + 1 : 0;
   report.collapsed = flat_steps_ >= kFlatStepsToReport;
 }

@@ -160,19 +160,23 @@ class Trainer {
   void restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata);
 
  private:
-  struct Variances {
-    BatchVariance pictures, targets, means;
-    std::array<BatchVariance*, 3> all() { return {&pictures, &targets, &means}; }
-    void clear();
-    void add(const Variances& other);
+  /// What micro-batches, then processes add up, in one piece: whether to stop, the terms of the loss, how
+  /// pictures, truths and the latents' means vary.
+  struct Statistics {
+    explicit Statistics(const Objective& objective);
+    std::size_t pixels;
+    std::vector<double> values;
+    std::span<double> terms() { return std::span(values).subspan(1, 5); }
+    BatchVariance pictures() { return {std::span(values).subspan(6, 2 * pixels)}; }
+    BatchVariance targets() { return {std::span(values).subspan(6 + 2 * pixels, 2 * pixels)}; }
+    BatchVariance means() { return {std::span(values).subspan(6 + 4 * pixels)}; }
   };
   struct MicroBatch {
     MicroBatch(const Objective& master, Dim first, Dim count);
     Dim first;            // its share of the batch: samples first .. first + inputs.dim(0)
     Objective objective;  // the master's values under gradients of its own
     Batch batch;
-    LossTerms terms;
-    Variances variances;
+    Statistics statistics;
     std::string trouble;  // where the loss stopped being finite
     std::exception_ptr error;
   };
@@ -180,7 +184,7 @@ class Trainer {
   void fill(MicroBatch& micro_batch) const;
   void draw_noise(MicroBatch& micro_batch) const;
   void run(MicroBatch& micro_batch) const;
-  // Of all of them: terms of the loss and variances, into the report, and what these say.
+  // Of all of them: the statistics, into the report, and what these say.
   void add_up_statistics(StepReport& report);
   void check_finite(const LossTerms& terms) const;
   void look_for_collapse(StepReport& report);
@@ -188,6 +192,13 @@ class Trainer {
   [[noreturn]] void stop(const std::string& what) const;
   // Adds up the gradients and moves the weights.
   double apply();
+  /// Adam's moments of each parameter, named as in a checkpoint.
+  struct Moments {
+    const Parameter& parameter;
+    std::string name;
+    Tensor& values;
+  };
+  std::vector<Moments> moments() const;
   void add_up_over_ranks();
 
   const WindowSet& windows_;
@@ -202,7 +213,7 @@ class Trainer {
   double best_score_ = 0;
   std::int64_t best_epoch_ = 0, epochs_since_best_ = 0;
   std::vector<real> sum_, of_partner_sum_;  // all gradients in one piece, of several processes
-  std::vector<double> statistics_, of_partner_;
+  std::vector<double> of_partner_;
   std::vector<std::uint32_t> indices_;                                 // of the batch
   std::vector<MicroBatch> micro_batches_;                              // of this process
   std::vector<const std::vector<Parameter>*> micro_batch_parameters_;  // of these models

@@ -42,13 +42,19 @@ void Trainer::use_best() {
   }
 }
 
+std::vector<Trainer::Moments> Trainer::moments() const {
+  std::vector<Moments> all;
+  for (std::size_t i = 0; i < model().parameters().size(); ++i) {
+    const Parameter& p = model().parameters()[i];
+    all.push_back({p, "optimizer.m." + p.name, adam_.first_moments()[i]});
+    all.push_back({p, "optimizer.v." + p.name, adam_.second_moments()[i]});
+  }
+  return all;
+}
+
 void Trainer::for_each_tensor(const std::function<void(const std::string&, const Tensor&)>& visit) const {
   for (const Parameter& p : model().parameters()) visit(p.name, p.value.value());
-  for (std::size_t i = 0; i < model().parameters().size(); ++i) {
-    const std::string& name = model().parameters()[i].name;
-    visit("optimizer.m." + name, adam_.first_moments()[i]);
-    visit("optimizer.v." + name, adam_.second_moments()[i]);
-  }
+  for (const Moments& m : moments()) visit(m.name, m.values);
 }
 
 void Trainer::save(const std::string& path, std::map<std::string, std::string> origin) const {
@@ -57,11 +63,7 @@ void Trainer::save(const std::string& path, std::map<std::string, std::string> o
   std::map<std::string, std::string> metadata = this->metadata(std::move(origin));
   const std::vector<Parameter>& parameters = model().parameters();
   std::vector<StoredTensor> state;
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const Parameter& p = parameters[i];
-    state.push_back(to_stored(p, adam_.first_moments()[i], "optimizer.m." + p.name));
-    state.push_back(to_stored(p, adam_.second_moments()[i], "optimizer.v." + p.name));
-  }
+  for (const Moments& m : moments()) state.push_back(to_stored(m.parameter, m.values, m.name));
   for (std::size_t i = 0; i < best_.size(); ++i)
     state.push_back(to_stored(parameters[i], best_[i], "optimizer.best." + parameters[i].name));
   if (!best_.empty()) {
@@ -86,12 +88,9 @@ void Trainer::restore(const std::string& path, const std::map<std::string, std::
     return *value;
   };
   const std::int64_t step = integer("step"), flat_steps = integer("flat_steps");
-  std::vector<Tensor> m, v;
-  for (const Parameter& p : model().parameters()) {
-    m.push_back(load_like(file, path, "optimizer.m." + p.name, p));
-    v.push_back(load_like(file, path, "optimizer.v." + p.name, p));
-  }
-  std::vector<Tensor> best;
+  const std::vector<Moments> moments = this->moments();
+  std::vector<Tensor> loaded, best;
+  for (const Moments& m : moments) loaded.push_back(load_like(file, path, m.name, m.parameter));
   std::int64_t best_epoch = 0, since_best = 0;
   if (file.metadata().contains("best_epoch")) {
     best_epoch = integer("best_epoch"), since_best = integer("epochs_since_best");
@@ -101,10 +100,7 @@ void Trainer::restore(const std::string& path, const std::map<std::string, std::
   load_parameters(file, path, model().parameters(), {"optimizer."});
   best_ = std::move(best), best_epoch_ = best_epoch, epochs_since_best_ = since_best;
   best_score_ = parse_double(value_or(file.metadata(), "best_score")).value_or(0);
-  for (std::size_t i = 0; i < m.size(); ++i) {
-    copy_into(adam_.first_moments()[i], m[i]);
-    copy_into(adam_.second_moments()[i], v[i]);
-  }
+  for (std::size_t i = 0; i < moments.size(); ++i) copy_into(moments[i].values, loaded[i]);
   adam_.set_steps(step);
   step_ = step;
   flat_steps_ = static_cast<int>(flat_steps);

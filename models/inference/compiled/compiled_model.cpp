@@ -62,29 +62,20 @@ Compiler::Compiler(const TracedPrediction& traced) : TraceWalk(traced) {
 
 const FeatureMap& Compiler::map_of(const Variable& x) const { return maps_.at(owner(x)); }
 
-static FeatureMap append(FeatureMap map, std::vector<FeatureMap>& all, Dim& size) {
+FeatureMap Plan::add_buffer(FeatureMap layout) {
   constexpr Dim kLine = 64;  // a line of the cache in bytes
-  map.offset = size;
-  size += (map.image() + kLine - 1) / kLine * kLine;
-  all.push_back(map);
-  return map;
+  layout.offset = workspace_;
+  workspace_ += (layout.image() + kLine - 1) / kLine * kLine;
+  return buffers_.emplace_back(layout);
 }
-
-FeatureMap Plan::add_buffer(FeatureMap layout) { return append(layout, buffers_, workspace_); }
 
 // One of the free buffers with this layout, or a new one.
-static FeatureMap take(FeatureMap map, std::vector<FeatureMap>& free, std::vector<FeatureMap>& all,
-                       Dim& size) {
-  const auto old =
-      std::find_if(free.begin(), free.end(), [&](const FeatureMap& m) { return m.same_layout(map); });
-  if (old == free.end()) return append(map, all, size);
-  map = *old;
-  free.erase(old);
-  return map;
-}
-
 const FeatureMap& Compiler::new_map(const Variable& y) {
-  return maps_[y.node()] = take(layout_of(y), free_, plan_->buffers_, plan_->workspace_);
+  const FeatureMap layout = layout_of(y);
+  const auto old = std::ranges::find_if(free_, [&](const FeatureMap& m) { return m.same_layout(layout); });
+  FeatureMap& map = maps_[y.node()] = old == free_.end() ? plan_->add_buffer(layout) : *old;
+  if (old != free_.end()) free_.erase(old);
+  return map;
 }
 
 void Compiler::release_after(std::size_t op) {

@@ -62,13 +62,11 @@ std::string describe_leaf(const Variable& leaf, const std::vector<Variable>& his
 
 }  // namespace
 
-void BatchVariance::clear() { std::fill(values_.begin(), values_.end(), 0.0); }
-
 void BatchVariance::add(const Tensor& batch, std::size_t first) {
   const Dim samples = batch.dim(0), count = samples > 0 ? batch.size() / samples : 0;
   const real* x = batch.data();
   for (Dim n = 0; n < samples; ++n) {
-    double *sum = &values_[first], *squares = &values_[entries() + first];
+    double *sum = &values[first], *squares = &values[entries() + first];
     for (Dim i = 0; i < count; ++i) {
       const auto value = static_cast<double>(*x++);
       sum[i] += value;
@@ -77,13 +75,9 @@ void BatchVariance::add(const Tensor& batch, std::size_t first) {
   }
 }
 
-void BatchVariance::add(const BatchVariance& other) {
-  for (std::size_t i = 0; i < values_.size(); ++i) values_[i] += other.values_[i];
-}
-
 double BatchVariance::variance(std::size_t i, double samples) const {
-  const double mean = values_[i] / samples;
-  return std::max(0.0, values_[entries() + i] / samples - mean * mean);
+  const double mean = values[i] / samples;
+  return std::max(0.0, values[entries() + i] / samples - mean * mean);
 }
 
 double BatchVariance::mean_variance(double samples) const {

@@ -10,25 +10,18 @@
 
 namespace supertac {
 
-/// How much each entry differs within a batch: sums that micro-batches gather and the trainer adds up.
-class BatchVariance {
- public:
-  BatchVariance() = default;
-  explicit BatchVariance(std::size_t entries) : values_(2 * entries) {}
-  void clear();
+/// How much each entry differs within a batch: a view of sums that micro-batches gather and the trainer adds
+/// up.
+struct BatchVariance {
+  std::span<double> values;  ///< a sum for each entry, then a sum of squares for each
+
   /// Adds a batch [N,...], whose entries are `first`, first + 1, ... of this object.
   void add(const Tensor& batch, std::size_t first = 0);
-  void add(const BatchVariance& other);
   /// Variance of entry i over `samples` samples.
   double variance(std::size_t i, double samples) const;
   /// The mean of all entries' variances.
   double mean_variance(double samples) const;
-  std::size_t entries() const { return values_.size() / 2; }
-  /// The sums themselves, to be added up over several processes.
-  std::span<double> values() { return values_; }
-
- private:
-  std::vector<double> values_;  // a sum for each entry, then a sum of squares for each
+  std::size_t entries() const { return values.size() / 2; }
 };
 
 /// Pictures that say nothing of the truths: their standard deviation over the batch is below 2 % of the
