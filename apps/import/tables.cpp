@@ -11,6 +11,7 @@
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
+#include "apps/import/text_folder.h"
 #include "data/plates/plate.h"
 #include "data/recordings/imports/imports.h"
 #include "data/registration/registration.h"
@@ -36,14 +37,12 @@ bool is_table(const fs::path& path) {
 std::vector<TableFile> tables_of(const std::string& input, const std::string& group) {
   if (!fs::is_directory(input)) return {{input, "", group}};
   std::vector<TableFile> tables;
-  for (const auto& entry : fs::directory_iterator(input)) {
-    if (!entry.is_directory() && is_table(entry.path())) tables.push_back({entry.path(), "", group});
-    if (!entry.is_directory()) continue;
-    for (const auto& below : fs::directory_iterator(entry.path()))
-      if (is_table(below.path()))
-        tables.push_back({below.path(), entry.path().filename().string(),
-                          group.empty() ? entry.path().filename().string() : group});
-  }
+  const auto take = [&](const fs::path& folder, const std::string& name) {
+    for (const fs::path& path : entries_of(folder, false))
+      if (is_table(path)) tables.push_back({path, name, group.empty() ? name : group});
+  };
+  take(input, "");
+  for (const fs::path& folder : entries_of(input, true)) take(folder, folder.filename().string());
   std::ranges::sort(tables, {}, &TableFile::path);
   if (tables.empty())
     throw FileError(input, "holds no table: expected *.csv, *.txt, *.tsv, *.npy or recordings");

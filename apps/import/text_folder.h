@@ -1,6 +1,7 @@
 // The rig's text recordings, found in their folder and registered against their plates.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -20,7 +21,7 @@ struct ImportedPass {
   bool unknown = false;    ///< the plate's shape: then `plate` is plain, the recording has its name
   std::string plate_file;  ///< the STL file that describes the plate; empty when its name does
   Recording recording = {};
-  ImportReport lines = {};
+  std::size_t lines = 0, dropped = 0;  ///< of the text file; empty ones do not count
   Registration registration = {};
 
   /// A line for people: lines read and dropped, residual, what alignment changed, reliable or why not.
@@ -31,12 +32,15 @@ struct ImportedPass {
 struct FolderImport {
   double speed_mm_s = 10;  ///< as commanded, of all passes
   /// Told of every file and folder that is no recording, or of no known plate, trial or pass; it is then left
-  /// out. It may throw to end the import. Unset: the first such FileError ends it.
-  std::function<void(const FileError&)> left_out = {};
-  /// Told before each file and before the passes of each plate are aligned, which takes seconds; it may throw
-  /// to stop.
-  std::function<void(std::size_t done, std::size_t files)> progress = {};
+  /// out. It may throw to end the import, as it does unless it is set.
+  std::function<void(const FileError&)> left_out = [](const FileError& error) { throw FileError(error); };
+  /// Told before the passes of each plate are read, and before they are aligned, which takes seconds; it may
+  /// throw to stop.
+  std::function<void(std::size_t done, std::size_t files)> progress = [](std::size_t, std::size_t) {};
 };
+
+/// Files, or folders, of a folder by name, hidden ones left out. Throws FileError.
+std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder, bool folders);
 
 /// Imports a folder of the rig's text recordings, `PLATE/TRIAL/PASS.txt` with PLATE a name that
 /// Plate::named takes, or `PLATE.stl` beside its folder, or any name that begins with "unknown": passes over

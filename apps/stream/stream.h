@@ -98,7 +98,7 @@ class Stream {
   /// Seconds of signal before the first picture.
   double window_s() const { return maker_ ? maker_->window_s() : 0; }
   /// Silences that no window crosses.
-  std::uint64_t gaps() const { return maker_ ? maker_->window().counters().gaps : 0; }
+  std::uint64_t gaps() const { return maker_ ? maker_->window().gaps() : 0; }
   /// "; ..." where frames come more or less often than the source says, else empty.
   std::string rate_remark() const;
   /// A line for people, and the same for --json.

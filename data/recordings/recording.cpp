@@ -44,7 +44,8 @@ std::optional<std::string> problem_of_truth(const Recording& recording) {
          format(*odd) + ", expected 0 to 1: scale it";
 }
 
-/// What is wrong with the recording, or nothing.
+}  // namespace
+
 std::optional<std::string> problem_of(const Recording& recording) {
   const std::size_t n = recording.frames();
   const auto sizes = [&](const char* name, std::size_t found, std::size_t expected) {
@@ -53,32 +54,24 @@ std::optional<std::string> problem_of(const Recording& recording) {
   };
   const std::size_t signals = recording.array.signals();
   if (recording.signals.size() != n * signals) return sizes("signals", recording.signals.size(), n * signals);
-  if (!recording.position_mm.empty() && recording.position_mm.size() != n * 2) {
+  if (!recording.position_mm.empty() && recording.position_mm.size() != n * 2)
     return sizes("position_mm", recording.position_mm.size(), n * 2);
-  }
   if (!recording.lift_mm.empty() && recording.lift_mm.size() != n)
     return sizes("lift_mm", recording.lift_mm.size(), n);
   for (std::size_t i = 0; i < n; ++i) {
     if (!std::isfinite(recording.time_s[i])) return "time_s is not finite at frame " + std::to_string(i);
-    if (i > 0 && recording.time_s[i] <= recording.time_s[i - 1]) {
+    if (i > 0 && recording.time_s[i] <= recording.time_s[i - 1])
       return "time_s does not increase at frame " + std::to_string(i);
-    }
   }
   const auto finite = [](float value) { return std::isfinite(value); };
-  const auto volt = std::find_if_not(recording.signals.begin(), recording.signals.end(), finite);
-  if (volt != recording.signals.end()) {
-    const auto index = volt - recording.signals.begin();
-    return "signals are not finite at frame " + std::to_string(static_cast<std::size_t>(index) / signals) +
-           ", taxel " +
-           std::to_string(static_cast<int>(static_cast<std::size_t>(index) % signals) /
-                          recording.array.channels);
-  }
-  const auto infinite = [](float value) { return std::isinf(value); };
-  if (std::any_of(recording.position_mm.begin(), recording.position_mm.end(), infinite)) {
+  const auto odd = static_cast<std::size_t>(std::ranges::find_if_not(recording.signals, finite) -
+                                            recording.signals.begin());
+  if (odd < n * signals)
+    return "signals are not finite at frame " + std::to_string(odd / signals) + ", taxel " +
+           std::to_string(static_cast<int>(odd % signals) / recording.array.channels);
+  if (std::ranges::any_of(recording.position_mm, [](float value) { return std::isinf(value); }))
     return "position_mm is infinite";
-  }
-  if (!std::all_of(recording.lift_mm.begin(), recording.lift_mm.end(), finite))
-    return "lift_mm is not finite";
+  if (!std::ranges::all_of(recording.lift_mm, finite)) return "lift_mm is not finite";
   if (const auto problem = problem_of_truth(recording)) return problem;
   if (recording.trial < 0 || recording.pass < 0) return "trial and pass must not be negative";
   if (!(recording.speed_mm_s >= 0 && recording.speed_mm_s <= kFastest))
@@ -94,6 +87,8 @@ std::optional<std::string> problem_of(const Recording& recording) {
     return "time_s lies beyond " + format(kLongest) + " s";
   return std::nullopt;
 }
+
+namespace {
 
 /// Takes one of our own fields out of the metadata.
 std::string take(std::map<std::string, std::string>& metadata, const std::string& path,
@@ -157,14 +152,11 @@ Recording recording_of(const SafetensorsFile& file) {
   const auto speed_value = parse_double(speed);
   if (!speed_value) throw FileError(path, "speed_mm_s is " + in_quotes(speed) + ", expected a number");
   recording.speed_mm_s = *speed_value;
-
   recording.array = array_of(file);
-  if (file.metadata().contains("signals"))
+  if (recording.metadata.erase("signals") > 0)
     recording.signal_scale = scale_of({file.metadata(), path, "signals"});
-  if (recording.metadata.contains("body")) recording.body = body_of({file.metadata(), path, "body"});
-  recording.metadata.erase("body");
-  recording.metadata.erase("array"), recording.metadata.erase("signals");
-
+  if (recording.metadata.erase("body") > 0) recording.body = body_of({file.metadata(), path, "body"});
+  recording.metadata.erase("array");
   for (const auto& [name, tensor] : file.tensors())
     if (std::ranges::find(kTensors, name) == std::end(kTensors) ||
         (name == "volts" && name != signals_tensor(file)))
@@ -242,14 +234,11 @@ std::map<std::string, std::string> metadata_of(const TaxelArray& array, const Si
 }
 
 std::map<std::string, std::string> metadata_of(const Recording& recording) {
-  const TaxelArray& array = recording.array;
   auto metadata = recording.metadata;
-  for (const char* field : kFields) {
-    if (metadata.contains(field)) {
+  for (const char* field : kFields)
+    if (metadata.contains(field))
       throw std::invalid_argument("write_recording: the metadata field " + in_quotes(field) +
                                   " is a member of the recording; set it there");
-    }
-  }
   metadata["kind"] = "recording";
   metadata["plate"] = recording.plate;
   metadata["trial"] = std::to_string(recording.trial);
@@ -257,10 +246,10 @@ std::map<std::string, std::string> metadata_of(const Recording& recording) {
   metadata["speed_mm_s"] = format(recording.speed_mm_s);
   metadata["source"] = recording.source;
   // Files of the rig's array have gone without from the start.
-  const auto of_sensor = metadata_of(array, recording.signal_scale);
-  if (array != TaxelArray{}) metadata["array"] = of_sensor.at("array");
+  const auto of_sensor = metadata_of(recording.array, recording.signal_scale);
+  if (recording.array != TaxelArray{}) metadata["array"] = of_sensor.at("array");
   if (recording.signal_scale != SignalScale{}) metadata["signals"] = of_sensor.at("signals");
-  if (recording.body && *recording.body != Body::usual(array))
+  if (recording.body && *recording.body != Body::usual(recording.array))
     metadata["body"] = json_of(*recording.body).dump();
   return metadata;
 }
@@ -277,15 +266,13 @@ std::vector<std::string> list_recordings(const std::string& folder) {
   std::vector<std::string> paths;
   std::error_code error;
   for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
+       entry.increment(error))
     if (entry->path().extension() == ".safetensors") paths.push_back(entry->path().string());
-  }
   if (error)
     throw FileError(folder, "cannot list the folder: " + error.message() + "; name a folder of recordings");
-  if (paths.empty()) {
+  if (paths.empty())
     throw FileError(folder,
                     "has no recordings (*.safetensors); make some with supertac-simulate or supertac-import");
-  }
   std::sort(paths.begin(), paths.end());
   return paths;
 }

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,9 @@ struct Recording {
   /// Wall-clock time of time_s 0 (s since 1970); NaN when the metadata name none ("began_s").
   double began_s() const;
 };
+
+/// What breaks a rule of read_recording(), or nothing.
+std::optional<std::string> problem_of(const Recording& recording);
 
 /// Converts the signals to another unit, polarity and range.
 void restate(Recording& recording, const SignalScale& scale);

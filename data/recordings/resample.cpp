@@ -15,109 +15,59 @@ namespace {
 
 constexpr double kTail = 0.005;
 
-bool finite(std::span<const float> signals) {
-  return std::all_of(signals.begin(), signals.end(), [](float v) { return std::isfinite(v); });
+// Where the finger was at `at`, between the recorded frame `before` and the next of a run that stops at
+// `end`.
+void append_position(const Recording& recording, double at, std::size_t before, std::size_t end,
+                     Track& track) {
+  const std::vector<double>& time = recording.time_s;
+  const std::size_t after = std::min(before + 1, end - 1);
+  track.recorded.push_back(static_cast<std::uint32_t>(time[after] - at < at - time[before] ? after : before));
+  if (recording.position_mm.empty()) {
+    track.position_mm.insert(track.position_mm.end(), 2, NAN);
+    track.lift_mm.push_back(0);
+    return;
+  }
+  const double span = time[after] - time[before];
+  const double part = span > 0 ? std::clamp((at - time[before]) / span, 0.0, 1.0) : 0.0;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const double a = recording.position_mm[2 * before + axis], b = recording.position_mm[2 * after + axis];
+    track.position_mm.push_back(static_cast<float>(part > 0 ? a + part * (b - a) : a));
+  }
+  const std::vector<float>& lift = recording.lift_mm;
+  track.lift_mm.push_back(lift.empty() ? 0 : std::lerp(lift[before], lift[after], static_cast<float>(part)));
 }
 
-std::span<const float> signals_of(const Recording& recording, std::size_t frame) {
-  const std::size_t signals = recording.array.signals();
-  return std::span(recording.signals).subspan(frame * signals, signals);
+// The recorded frames [first, end), which no gap interrupts.
+void append_run(const Recording& recording, const ResampleSettings& settings, std::size_t first,
+                std::size_t end, Track& track) {
+  const std::vector<double>& time = recording.time_s;
+  const std::size_t samples = sample_at(time[end - 1] - time[first], settings.rate_hz) + 1;
+  // A file that claims a high rate must not decide how much memory that takes.
+  constexpr std::size_t kMostPerFrame = 64;
+  if (samples > kMostPerFrame * (end - first + 1))
+    throw std::invalid_argument("resample: " + std::to_string(settings.rate_hz) +
+                                " samples a second are more than " + std::to_string(kMostPerFrame) +
+                                " for each recorded frame; the model is of another sensor");
+  const std::size_t signals = recording.array.signals(), begin = track.samples.size();
+  track.samples.resize(begin + samples * signals);
+  track.held += samples;
+  Resampler resampler(signals, settings.rate_hz, settings.scaling);
+  for (std::size_t i = first; i < end; ++i) {
+    const std::size_t had = resampler.samples();
+    resampler.add(time[i], std::span(recording.signals).subspan(i * signals, signals),
+                  [&](std::size_t j, std::span<const float> sample) {
+                    std::ranges::copy(
+                        sample, track.samples.begin() + static_cast<std::ptrdiff_t>(begin + j * signals));
+                  });
+    if (resampler.samples() > had) --track.held;
+  }
+  for (std::size_t j = 0, before = first; j < samples; ++j) {
+    const double at = time[first] + static_cast<double>(j) / settings.rate_hz;
+    while (before + 1 < end && time[before + 1] <= at) ++before;
+    append_position(recording, at, before, end, track);
+    track.run.push_back(static_cast<std::uint32_t>(j + 1));
+  }
 }
-
-void check(const Recording& recording, const ResampleSettings& settings) {
-  const auto require = [](bool holds, const char* argument, const char* expected, double found) {
-    if (!holds) throw std::invalid_argument(refusal("resample", argument, expected, format(found)));
-  };
-  const double span = settings.scaling.value_or(Scaling{}).span;
-  require(settings.rate_hz > 0, "rate_hz", "more than 0", settings.rate_hz);
-  require(settings.max_gap_s > 0, "max_gap_s", "more than 0", settings.max_gap_s);
-  require(std::abs(span) > 0, "scaling.span", "a number other than 0", span);
-  const std::size_t n = recording.time_s.size(), values = n * recording.array.signals();
-  const std::size_t positions = recording.position_mm.size(), lifts = recording.lift_mm.size();
-  if (recording.signals.size() != values || (positions != 0 && positions != 2 * n) ||
-      (lifts != 0 && lifts != n))
-    throw std::runtime_error("recording: " + std::to_string(n) + " time stamps need " +
-                             std::to_string(values) + " signals, 0 or " + std::to_string(2 * n) +
-                             " coordinates and 0 or " + std::to_string(n) + " lifts, got " +
-                             std::to_string(recording.signals.size()) + ", " + std::to_string(positions) +
-                             " and " + std::to_string(lifts) + "; record or import the pass again");
-  for (std::size_t i = 0; i < n; ++i)
-    if (!std::isfinite(recording.time_s[i]) || (i > 0 && recording.time_s[i] <= recording.time_s[i - 1]))
-      throw std::runtime_error("recording: time stamps must increase, frame " + std::to_string(i) +
-                               " is at " + std::to_string(recording.time_s[i]) + " s" +
-                               (i > 0 ? " after " + std::to_string(recording.time_s[i - 1]) + " s" : "") +
-                               "; record or import the pass again");
-}
-
-// Resamples the recorded frames `usable`, which no gap interrupts.
-class Segment {
- public:
-  Segment(const Recording& recording, const ResampleSettings& settings, std::span<const std::size_t> usable)
-      : recording_(recording), settings_(settings), usable_(usable), start_(time(0)) {}
-
-  void append_to(Track& track) const {
-    const std::size_t samples = sample_at(time(usable_.size() - 1) - start_, settings_.rate_hz) + 1;
-    // A file that claims a high rate must not decide how much memory that takes.
-    constexpr std::size_t kMostPerFrame = 64;
-    if (samples > kMostPerFrame * (usable_.size() + 1))
-      throw std::invalid_argument("resample: " + std::to_string(settings_.rate_hz) +
-                                  " samples a second are more than " + std::to_string(kMostPerFrame) +
-                                  " for each recorded frame; the model is of another sensor");
-    append_samples(track, samples);
-    std::size_t before = 0;
-    for (std::size_t j = 0; j < samples; ++j) {
-      append_position(track, start_ + static_cast<double>(j) / settings_.rate_hz, before);
-      track.run.push_back(static_cast<std::uint32_t>(j + 1));
-    }
-  }
-
- private:
-  double time(std::size_t i) const { return recording_.time_s[usable_[i]]; }
-
-  void append_samples(Track& track, std::size_t samples) const {
-    const std::size_t signals = recording_.array.signals(), begin = track.samples.size();
-    track.samples.resize(begin + samples * signals);
-    track.held += samples;
-    Resampler resampler(signals, settings_.rate_hz, settings_.scaling);
-    for (std::size_t i = 0; i < usable_.size(); ++i) {
-      const std::size_t had = resampler.samples();
-      resampler.add(time(i), signals_of(recording_, usable_[i]),
-                    [&](std::size_t j, std::span<const float> sample) {
-                      std::ranges::copy(
-                          sample, track.samples.begin() + static_cast<std::ptrdiff_t>(begin + j * signals));
-                    });
-      if (resampler.samples() > had) --track.held;
-    }
-  }
-
-  // `before` moves along with the time: the last recorded frame at or before it.
-  void append_position(Track& track, double at, std::size_t& before) const {
-    while (before + 1 < usable_.size() && time(before + 1) <= at) ++before;
-    const bool next = before + 1 < usable_.size() && time(before + 1) - at < at - time(before);
-    track.recorded.push_back(static_cast<std::uint32_t>(usable_[before + (next ? 1 : 0)]));
-    if (recording_.position_mm.empty()) {
-      track.position_mm.insert(track.position_mm.end(), 2, NAN);
-      track.lift_mm.push_back(0);
-      return;
-    }
-    const std::size_t after = std::min(before + 1, usable_.size() - 1);
-    const double span = time(after) - time(before);
-    const double part = span > 0 ? std::clamp((at - time(before)) / span, 0.0, 1.0) : 0.0;
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      const double a = recording_.position_mm[2 * usable_[before] + axis];
-      const double b = recording_.position_mm[2 * usable_[after] + axis];
-      track.position_mm.push_back(static_cast<float>(part > 0 ? a + part * (b - a) : a));
-    }
-    const std::vector<float>& lift = recording_.lift_mm;
-    track.lift_mm.push_back(
-        lift.empty() ? 0 : std::lerp(lift[usable_[before]], lift[usable_[after]], static_cast<float>(part)));
-  }
-
-  const Recording& recording_;
-  const ResampleSettings& settings_;
-  std::span<const std::size_t> usable_;
-  double start_;
-};
 
 }  // namespace
 
@@ -152,24 +102,16 @@ std::size_t sample_at(double since_begin_s, double rate_hz) {
 }
 
 Track resample(const Recording& recording, const ResampleSettings& settings) {
-  check(recording, settings);
+  if (const auto problem = problem_of(recording))
+    throw std::runtime_error("recording: " + *problem + "; record or import the pass again");
   Track track;
-  std::vector<std::size_t> usable;
-  for (std::size_t i = 0; i < recording.time_s.size(); ++i) {
-    if (finite(signals_of(recording, i)))
-      usable.push_back(i);
-    else
-      ++track.damaged;
-  }
+  const std::vector<double>& time = recording.time_s;
   const double most_s = std::max(settings.max_gap_s, kGapPeriods * recording.period_s());
-  std::size_t first = 0;
-  for (std::size_t i = 1; i <= usable.size(); ++i) {
-    const bool ends = i == usable.size() || settings.frames_apart ||
-                      recording.time_s[usable[i]] - recording.time_s[usable[i - 1]] > most_s;
-    if (!ends) continue;
-    Segment(recording, settings, std::span(usable).subspan(first, i - first)).append_to(track);
-    if (i < usable.size()) ++track.gaps;
-    first = i;
+  for (std::size_t first = 0, end = 0; first < time.size(); first = end) {
+    for (end = first + 1; end < time.size() && !settings.frames_apart && time[end] - time[end - 1] <= most_s;)
+      ++end;
+    append_run(recording, settings, first, end, track);
+    if (end < time.size()) ++track.gaps;
   }
   return track;
 }
@@ -213,10 +155,7 @@ void SignalRange::add(const Recording& recording) {
   const std::size_t signals = recording.array.signals(), frames = recording.frames();
   const std::size_t apart = factor_ * std::clamp(frames / 16, std::size_t{1}, std::size_t{64});
   for (; next_ < frames; next_ += apart)
-    for (std::size_t k = 0; k < signals; ++k) {
-      const float value = recording.signals[next_ * signals + k];
-      if (std::isfinite(value)) values_.push_back(value);
-    }
+    for (std::size_t k = 0; k < signals; ++k) values_.push_back(recording.signals[next_ * signals + k]);
   sorted_ = false;
   next_ = factor_ > 1 ? next_ - frames : 0;
   while (values_.size() > (1 << 22)) thin_out();

@@ -54,8 +54,7 @@ std::size_t sample_at(double since_begin_s, double rate_hz);
 /// what is drawn after a frame is what is drawn of a recording that ends with it.
 class Resampler {
  public:
-  /// `scaling`: nothing leaves the samples as they come.
-  Resampler(std::size_t signals, double rate_hz, const std::optional<Scaling>& scaling)
+  Resampler(std::size_t signals, double rate_hz, const Scaling& scaling)
       : rate_hz_(rate_hz), scaling_(scaling), mean_(signals), newest_(signals) {}
   /// The next frame begins a run.
   void restart() { samples_ = 0; }
@@ -73,13 +72,13 @@ class Resampler {
     samples_ = j + 1;
     mean_.add(signals);
     mean_.write(newest_);
-    if (scaling_) (*scaling_)(newest_);
+    scaling_(newest_);
     give(j, std::span<const float>(newest_));
   }
 
  private:
   double rate_hz_, begin_s_ = 0;
-  std::optional<Scaling> scaling_;
+  Scaling scaling_;
   FrameMean mean_;             // of the newest sample's frames
   std::vector<float> newest_;  // that mean, scaled
   std::size_t samples_ = 0;
@@ -92,10 +91,9 @@ struct Track {
   std::vector<float> lift_mm;           ///< [frames], as Recording's; 0 where it has none
   std::vector<std::uint32_t> recorded;  ///< [frames]: the recorded frame nearest in time, whose truth it has
   std::vector<std::uint32_t>
-      run;                  ///< [frames]: frames since the pass began or since the last gap, itself included
-  std::size_t held = 0;     ///< frames for which no sample arrived: they repeat the one before
-  std::size_t gaps = 0;     ///< places where the recording is interrupted for longer than max_gap_s
-  std::size_t damaged = 0;  ///< recorded frames with a signal that is not finite: taken as lost
+      run;               ///< [frames]: frames since the pass began or since the last gap, itself included
+  std::size_t held = 0;  ///< frames for which no sample arrived: they repeat the one before
+  std::size_t gaps = 0;  ///< places where the recording is interrupted for longer than max_gap_s
   std::size_t frames() const { return run.size(); }
 };
 
@@ -108,15 +106,15 @@ struct ResampleSettings {
   /// recording.
   double max_gap_s = 0.05;
   bool frames_apart = false;  ///< each recorded frame is one sample of its own, whatever lies between
-  std::optional<Scaling> scaling = Scaling{};  ///< empty: the samples stay as recorded
+  Scaling scaling = {};
 };
 
 /// Puts a recording onto rate_hz, each run between two gaps by a Resampler; samples without a frame are
 /// counted in `held`. position[j] is the position at the time that sample j stands for, linear between
 /// recorded frames. Causal but for half a period (5 ms at 100 Hz). A recording made at rate_hz comes out as
 /// it is.
-/// Throws std::invalid_argument on settings that are not positive, std::runtime_error when the sizes of the
-/// recording's arrays disagree or its time stamps do not increase.
+/// Throws std::runtime_error when the recording breaks a rule (problem_of()), std::invalid_argument for a
+/// rate far above the recording's. The settings must be positive.
 Track resample(const Recording& recording, const ResampleSettings& settings);
 
 /// Called before each recording of a folder is read, with how many were read and how many there are; what it

@@ -46,7 +46,7 @@ class PassSignals {
       for (std::size_t i = 0; i < pressed.size(); ++i)
         for (std::size_t column = 0; column < rig::kTaxelColumns; ++column) {
           const float v = recording.signals[(first + i) * rig::kTaxels + row * rig::kTaxelColumns + column];
-          pressed[i] += std::isfinite(v) ? Scaling{}(v) / rig::kTaxelColumns : 0;
+          pressed[i] += Scaling{}(v) / rig::kTaxelColumns;
         }
       sum_[row].assign(pressed.size() + 1, 0);
       for (std::size_t i = 0; i < pressed.size(); ++i) sum_[row][i + 1] = sum_[row][i] + pressed[i];

@@ -32,7 +32,6 @@ std::vector<double> binned(const Recording& recording, int taxel, std::size_t bi
     for (std::size_t c = 0; c < channels; ++c) volts += signals[c];
     volts /= static_cast<double>(channels);
     if (recording.signal_scale != rig) volts = recording.signal_scale.in(rig, volts);
-    if (!std::isfinite(volts)) continue;
     const auto bin = static_cast<std::size_t>((recording.time_s[i] - recording.time_s[0]) / kBinS);
     if (bin >= bins) continue;
     sum[bin] += rig::kAdcVolts - volts, count[bin] += 1;
@@ -101,11 +100,6 @@ void find_in(const std::vector<double>& bins, int taxel, double start_s, double 
 
 std::vector<Contact> find_contacts(const Recording& recording, double reach_s) {
   const std::size_t n = recording.frames();
-  const std::size_t signals = recording.array.signals();
-  if (recording.signals.size() != n * signals)
-    throw std::invalid_argument("find_contacts: " + std::to_string(n) + " frames need " +
-                                std::to_string(n * signals) + " signals, got " +
-                                std::to_string(recording.signals.size()));
   std::vector<Contact> found;
   if (n < 3) return found;
   const double duration = recording.time_s.back() - recording.time_s.front();
@@ -143,11 +137,9 @@ Usual usual_step(const Recording& recording, std::size_t around, std::size_t s) 
   const std::size_t from = around > kAround ? around - kAround : 1;
   const std::size_t to = std::min(around + kAround + 1, recording.frames());
   std::array<double, 2 * kAround + 1> found{};
-  std::size_t n = 0;
-  for (std::size_t i = from; i < to; ++i)
-    if (const double d = step_before(recording, i, s); std::isfinite(d)) found[n++] = d;
-  if (n == 0) return {};
-  const std::span<double> steps = std::span(found).first(n);
+  const std::span<double> steps = std::span(found).first(to - from);
+  if (steps.empty()) return {};
+  for (std::size_t i = from; i < to; ++i) steps[i - from] = step_before(recording, i, s);
   const double step = median(steps);
   for (double& d : steps) d = std::abs(d - step);
   return {.step = step, .deviation = normal_deviation(steps) + kRoundingVolts};
@@ -162,7 +154,6 @@ Steps steps_before(const Recording& recording, std::size_t i, std::span<const Us
   double agreement = 0, information = 0;
   for (std::size_t s = 0; s < usual.size(); ++s) {
     const double d = step_before(recording, i, s);
-    if (!std::isfinite(d)) continue;
     const double weight = 1 / (usual[s].deviation * usual[s].deviation);
     agreement += weight * d * usual[s].step;
     information += weight * usual[s].step * usual[s].step;
@@ -179,11 +170,9 @@ std::vector<double> changes(const Recording& recording) {
                        static_cast<double>(rig::kTaxels) / static_cast<double>(signals);  // of the rig: 1
   std::vector<double> change(recording.frames());
   for (std::size_t i = 1; i < change.size(); ++i)
-    for (std::size_t s = 0; s < signals; ++s) {
-      const double step =
-          std::abs(recording.signals[i * signals + s] - recording.signals[(i - 1) * signals + s]);
-      if (std::isfinite(step)) change[i] += share * step;
-    }
+    for (std::size_t s = 0; s < signals; ++s)
+      change[i] +=
+          share * std::abs(recording.signals[i * signals + s] - recording.signals[(i - 1) * signals + s]);
   return change;
 }
 

@@ -16,9 +16,9 @@ struct Contact {
 };
 
 /// The contacts of all taxels, by taxel and time. Rims are sought within reach_s to either side (about 0.6
-/// pitches); dips shallower than 8 mV, or than a tenth of the taxel's deepest one, are noise. Frames that
-/// hold no finite number are skipped; a taxel that never moves has none. Throws std::invalid_argument when
-/// the recording's arrays do not fit together.
+/// pitches); dips shallower than 8 mV, or than a tenth of the taxel's deepest one, are noise; a taxel
+/// that never moves has none. Throws std::invalid_argument when the recording's times do not increase, or
+/// span more than 10,000 s.
 std::vector<Contact> find_contacts(const Recording& recording, double reach_s = 0.5);
 
 /// Frames that a host lost without a trace, found in the signals. n numbers: how many are missing between
@@ -30,7 +30,7 @@ std::vector<Contact> find_contacts(const Recording& recording, double reach_s = 
 ///   k + 1 = sum_s w_s d_s u_s / sum_s w_s u_s^2,   w_s = 1 / (deviation of s's steps from u_s)^2,
 /// d_s the steps found there, with an uncertainty of 1 / sqrt(sum_s w_s u_s^2). It counts when it is
 /// above 1.5 by three of them. Where the signals stand still (uncertainty above a quarter) the mean of all
-/// other places is assumed. Values that are not finite say nothing.
+/// other places is assumed.
 std::vector<double> find_lost_frames(const Recording& recording, double rate_hz);
 
 /// Puts the time of lost frames back into the stamps of a recording made at rate_hz. Metadata lost_frames

@@ -6,54 +6,29 @@
 #include <string>
 
 #include "data/windows/transforms.h"
-#include "io/numbers/numbers.h"
-#include "io/numbers/text.h"
 
 namespace supertac {
-namespace {
-
-LiveWindowSettings checked(LiveWindowSettings s) {
-  const auto require = [](bool holds, const char* argument, const char* expected, double found) {
-    if (!holds) throw std::invalid_argument(refusal("live window", argument, expected, format(found)));
-  };
-  require(s.signals >= 1, "signals", "1 or more", static_cast<double>(s.signals));
-  require(s.timesteps >= 1, "timesteps", "1 or more", static_cast<double>(s.timesteps));
-  require(s.rate_hz > 0, "rate_hz", "more than 0", s.rate_hz);
-  require(s.frame_period_s > 0, "frame_period_s", "more than 0", s.frame_period_s);
-  require(s.max_gap_s > 0, "max_gap_s", "more than 0", s.max_gap_s);
-  require(std::abs(s.scaling.span) > 0, "scaling.span", "a number other than 0", s.scaling.span);
-  require(s.filter_s >= 0, "filter_s", "0 or more", s.filter_s);
-  s.max_gap_s = std::max(s.max_gap_s, kGapPeriods * s.frame_period_s);
-  return s;
-}
-
-}  // namespace
-
 LiveWindow::LiveWindow(const LiveWindowSettings& settings)
-    : settings_(checked(settings)),
+    : settings_(settings),
       resampler_(settings.signals, settings.rate_hz, settings.scaling),
       ring_(static_cast<std::size_t>(settings.timesteps) * settings.signals),
       mean_(settings.signals),
-      average_(settings.signals) {}
+      average_(settings.signals) {
+  settings_.max_gap_s = std::max(settings.max_gap_s, kGapPeriods * settings.frame_period_s);
+}
 
 void LiveWindow::push(double time_s, std::span<const float> frame) {
   if (frame.size() != settings_.signals)
     throw std::invalid_argument("live window: a frame has " + std::to_string(settings_.signals) +
                                 " signals, got " + std::to_string(frame.size()));
-  if (!std::isfinite(time_s) ||
-      !std::all_of(frame.begin(), frame.end(), [](float v) { return std::isfinite(v); })) {
-    ++counters_.damaged;
-    return;
-  }
+  if (!std::isfinite(time_s) || !std::ranges::all_of(frame, [](float v) { return std::isfinite(v); })) return;
   if (!newest_s_ || std::abs(time_s - *newest_s_) > settings_.max_gap_s) {
-    if (newest_s_) ++counters_.gaps;
+    if (newest_s_) ++gaps_;
     recent_s_.clear(), recent_.clear();
     resampler_.restart();
   } else if (time_s <= *newest_s_) {
-    ++counters_.late;
     return;
   }
-  ++counters_.frames;
   newest_s_ = time_s;
   if (settings_.filter_s > 0) {
     average(time_s, frame);

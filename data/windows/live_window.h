@@ -32,16 +32,10 @@ struct LiveWindowSettings {
 /// one window, and of the frames that the average is over.
 class LiveWindow {
  public:
-  struct Counters {
-    std::size_t frames = 0;   ///< taken
-    std::size_t gaps = 0;     ///< silences, or steps back, longer than max_gap_s: all starts anew
-    std::size_t damaged = 0;  ///< a signal or the time is not finite: taken as lost
-    std::size_t late = 0;     ///< not later than the frame before: left out
-  };
-
-  /// Throws std::invalid_argument on settings out of range.
   explicit LiveWindow(const LiveWindowSettings& settings);
 
+  /// A frame with a signal or a time that is not finite is taken as lost, one that is not later than the one
+  /// before is left out.
   /// Throws std::invalid_argument when the frame has another number of signals.
   void push(double time_s, std::span<const float> frame);
 
@@ -50,7 +44,8 @@ class LiveWindow {
   /// another size.
   bool window(std::span<float> out) const;
 
-  const Counters& counters() const { return counters_; }
+  /// Silences, or steps back, longer than max_gap_s: all started anew.
+  std::size_t gaps() const { return gaps_; }
 
  private:
   void average(double time_s, std::span<const float> frame);
@@ -63,7 +58,7 @@ class LiveWindow {
   std::vector<float> recent_;     // and their signals
   FrameMean mean_;
   std::vector<float> average_;
-  Counters counters_;
+  std::size_t gaps_ = 0;
 };
 
 }  // namespace supertac

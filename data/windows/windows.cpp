@@ -68,34 +68,12 @@ std::string WindowCounts::summary() const {
          part(too_early, "too close to the start of a pass or to a gap") +
          part(off_stride, "between strides") +
          (held > 0 ? "; " + std::to_string(held) + " samples without a frame repeat the one before" : "") +
-         part(gaps, "gaps") + part(damaged, "damaged");
+         part(gaps, "gaps");
 }
 
 WindowSet WindowSet::load(const std::string& dir, const std::vector<std::string>& plates,
                           const WindowSettings& settings, const ReadingWatch& watch) {
   WindowSet set(settings);
-  set.add_directory(dir, plates, {}, watch);
-  set.check_any(dir);
-  return set;
-}
-
-void WindowSet::check_any(const std::string& dir) const {
-  if (size() > 0) return;
-  const std::pair<std::size_t, const char*> reasons[] = {
-      {counts_.unreliable, "import the passes again with their right plate and --speed"},
-      {counts_.no_position,
-       "truth needs positions or a tensor 'truth': import or collect passes over a known plate"},
-      {counts_.lifting, "give passes in which the finger slides"},
-      {counts_.too_early, "try fewer timesteps or longer passes"},
-      {counts_.off_stride, "try a smaller stride"}};
-  const auto [most, help] = *std::ranges::max_element(reasons, {}, [](const auto& r) { return r.first; });
-  const char* advice = most > 0 ? help : "give recordings that hold frames";
-  throw std::runtime_error(dir + ": no window of " + std::to_string(settings_.timesteps) +
-                           " frames: " + counts_.summary() + "; " + advice);
-}
-
-void WindowSet::add_directory(const std::string& dir, const std::vector<std::string>& plates,
-                              const PassUse& use, const ReadingWatch& watch) {
   std::set<std::string> missing(plates.begin(), plates.end()), found;
   const std::vector<std::string> paths = list_recordings(dir);
   for (std::size_t i = 0; i < paths.size(); ++i) {
@@ -105,7 +83,7 @@ void WindowSet::add_directory(const std::string& dir, const std::vector<std::str
     missing.erase(recording.plate);
     if (!plates.empty() && std::ranges::find(plates, recording.plate) == plates.end()) continue;
     try {
-      add(recording, dir, use);
+      set.add(recording, dir);
     } catch (const std::bad_alloc&) {
       throw;
     } catch (const std::exception& error) {
@@ -115,6 +93,22 @@ void WindowSet::add_directory(const std::string& dir, const std::vector<std::str
   if (!missing.empty())
     throw std::invalid_argument("windows: plate '" + *missing.begin() + "' has no recording in " + dir +
                                 "; it has those of " + joined(found, ", "));
+  if (set.size() == 0) throw std::runtime_error(dir + ": " + set.why_empty());
+  return set;
+}
+
+// Where its frames went, and what helps.
+std::string WindowSet::why_empty() const {
+  const std::pair<std::size_t, const char*> reasons[] = {
+      {counts_.unreliable, "import the passes again with their right plate and --speed"},
+      {counts_.no_position,
+       "truth needs positions or a tensor 'truth': import or collect passes over a known plate"},
+      {counts_.lifting, "give passes in which the finger slides"},
+      {counts_.too_early, "try fewer timesteps or longer passes"},
+      {counts_.off_stride, "try a smaller stride"}};
+  const auto [most, help] = *std::ranges::max_element(reasons, {}, [](const auto& r) { return r.first; });
+  return "no window of " + std::to_string(settings_.timesteps) + " frames: " + counts_.summary() + "; " +
+         (most > 0 ? help : "give recordings that hold frames");
 }
 
 WindowSet::WindowSet(const WindowSettings& settings)
@@ -202,7 +196,6 @@ void WindowSet::add(const Recording& recording, const std::string& folder, const
   counts_.frames += track.frames();
   counts_.held += track.held;
   if (settings_.timesteps > 1) counts_.gaps += track.gaps;
-  counts_.damaged += track.damaged;
   passes_.push_back(std::move(pass));
   stored_.push_back(stored);
 }
@@ -250,21 +243,6 @@ std::array<float, 3> WindowSet::finger(const Place& place) const {
   std::array<float, kFingerNumbers> finger;
   file_->read(stored_[place.pass].fingers + place.last * kFingerNumbers, finger);
   return finger;
-}
-
-Track WindowSet::track(std::size_t pass) const {
-  Track track;
-  if (passes_[pass].windows == 0) return track;
-  const std::size_t frames = passes_[pass].frames;
-  track.samples.resize(frames * array().signals());
-  file_->read(stored_[pass].samples, track.samples);
-  std::vector<float> fingers(frames * kFingerNumbers);
-  file_->read(stored_[pass].fingers, fingers);
-  for (std::size_t i = 0; i < fingers.size(); i += kFingerNumbers) {
-    track.position_mm.insert(track.position_mm.end(), {fingers[i], fingers[i + 1]});
-    track.lift_mm.push_back(fingers[i + 2]);
-  }
-  return track;
 }
 
 // From so many frames before the last one of a window on.
@@ -353,21 +331,23 @@ std::string WindowSet::fingerprint() const {
   for (std::size_t p = 0; p < passes_.size(); ++p) {
     hash.add(passes_[p].plate);
     hash.add(passes_[p].trial);
-    const Track all = track(p);
-    for (const auto* values : {&all.samples, &all.position_mm, &all.lift_mm})
-      for (const float v : *values) hash.add(v);
-    if (!truth_is_measured(p)) continue;
-    std::vector<float> truth(image().pixels());
-    for (std::size_t i = 0; i < all.lift_mm.size(); ++i) {
+    if (passes_[p].windows == 0) continue;
+    std::vector<float> samples(passes_[p].frames * array().signals()),
+        fingers(passes_[p].frames * kFingerNumbers), truth(image().pixels());
+    file_->read(stored_[p].samples, samples);
+    file_->read(stored_[p].fingers, fingers);
+    for (const float v : samples) hash.add(v);
+    for (std::size_t i = 0; i < fingers.size(); i += kFingerNumbers)
+      hash.add(fingers[i]), hash.add(fingers[i + 1]);
+    for (std::size_t i = 2; i < fingers.size(); i += kFingerNumbers) hash.add(fingers[i]);
+    for (std::size_t i = 0; truth_is_measured(p) && i < passes_[p].frames; ++i) {
       file_->read(stored_[p].truths + i * truth.size(), truth);
       for (const float v : truth) hash.add(v);
     }
   }
-  for (std::size_t r = 0; r < rows_.size(); ++r) {
-    const std::size_t end = r + 1 < rows_.size() ? rows_[r + 1].first_window : size();
-    for (std::size_t i = rows_[r].first_window; i < end; ++i)
-      hash.add((std::uint64_t{rows_[r].pass} << 32) |
-               (rows_[r].last + (i - rows_[r].first_window) * rows_[r].stride));
+  for (std::size_t i = 0; i < size(); ++i) {
+    const Place place = place_of(i);
+    hash.add((std::uint64_t{place.pass} << 32) | place.last);
   }
   return hash.hex();
 }

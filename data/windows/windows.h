@@ -44,7 +44,7 @@ struct WindowCounts {
   std::size_t off_stride = 0;
   std::size_t windows = 0;
   // About the signals of all recordings:
-  std::size_t held = 0, gaps = 0, damaged = 0;  ///< as in Track
+  std::size_t held = 0, gaps = 0;  ///< as in Track
   /// One line, for people.
   std::string summary() const;
 };
@@ -97,13 +97,6 @@ class WindowSet {
   /// file beside it. Throws as plate_in_folder() and resample(), std::runtime_error for another array, or a
   /// measured truth that is not scale() times as fine as the array; FileError as ScratchFile.
   void add(const Recording& recording, const std::string& folder = ".", const PassUse& use = {});
-  /// Appends those of all recordings in a directory, of these plates (empty: all). Throws as load, but for
-  /// the missing windows.
-  void add_directory(const std::string& dir, const std::vector<std::string>& plates, const PassUse& use = {},
-                     const ReadingWatch& watch = {});
-  /// Throws std::runtime_error, saying where the frames of `dir` went and what helps, when there is no
-  /// window.
-  void check_any(const std::string& dir) const;
 
   std::size_t size() const { return counts_.windows; }
   std::size_t frames() const { return static_cast<std::size_t>(settings_.timesteps); }
@@ -153,9 +146,6 @@ class WindowSet {
   /// Frames since its pass began or since the last gap, the last frame included: at least frames().
   std::size_t history(std::size_t i) const { return place_of(i).run; }
   bool truth_is_measured(std::size_t pass) const { return plates_[stored_[pass].plate].measured; }
-  /// Samples, positions and lifts of a whole pass; none when no window ends in it.
-  Track track(std::size_t pass) const;
-
   /// The filter_s of all passes but those that are not in_distribution, or nothing when they differ.
   std::optional<double> filter_s() const;
 
@@ -180,6 +170,7 @@ class WindowSet {
     Plate plate;
     bool measured;  // its recordings have truths of their own: nothing is known of its shape
   };
+  std::string why_empty() const;
   void expect_array(const Recording& recording);
   void expect_unit(const SignalScale& found);
   std::size_t plate_index(const Recording& recording, const std::string& folder);

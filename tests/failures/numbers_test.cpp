@@ -136,14 +136,12 @@ TEST(Failures, F11ANanInAWindowReachesEveryPixel) {
   for (const real x : random_network().infer(window).values()) EXPECT_TRUE(std::isnan(x));
 }
 
-TEST(Failures, F11DamagedFramesAreDroppedAndConstantLargeAndDeadSignalsTrainToFiniteNumbers) {
+TEST(Failures, F11ConstantLargeAndDeadSignalsTrainToFiniteNumbers) {
   SmallTraining small;
   small.windows = small_windows(small.recipe.model, 150, [](Recording& r) {
     for (std::size_t i = 5; i < r.signals.size(); i += rig::kTaxels) r.signals[i] = 2.46F;
     if (r.trial == 2) std::ranges::fill(r.signals, 2400.0F);
-    r.signals[50 * rig::kTaxels + 3] = std::nanf("");
   });
-  EXPECT_EQ(small.windows.counts().damaged, 2U);
   for (std::size_t i = 0; i < small.windows.size(); ++i)
     for (const float x : small.windows.raw_window(i)) ASSERT_TRUE(x >= 0 && x <= 1);
   Trainer trainer = small.trainer();

@@ -71,13 +71,9 @@ struct Sums {
   }
 };
 
-struct Place {
-  double offset_s, rate, correlation;
-};
-
-// Every offset and rate, about the film's middle.
-std::vector<Place> tried(const Even& sensor, const Even& film, double around_s, double middle_s) {
-  std::vector<Place> places;
+// Every offset, there at the film's middle, and rate.
+std::vector<FilmClock> tried(const Even& sensor, const Even& film, double around_s, double middle_s) {
+  std::vector<FilmClock> places;
   const double half_s = film.step_s * static_cast<double>(film.load.size()) / 2;
   const double rate_step = std::min(kMostRate, 1.5 * kCoarseS / half_s);
   for (double rate = 1 - kMostRate; rate <= 1 + kMostRate + rate_step / 2; rate += rate_step)
@@ -89,7 +85,7 @@ std::vector<Place> tried(const Even& sensor, const Even& film, double around_s, 
       }
       if (sums.n * film.step_s >= kFarthestS &&
           2 * sums.n >= static_cast<double>(std::min(film.load.size(), sensor.load.size())))
-        places.push_back({around_s + shift, rate, sums.correlation()});
+        places.push_back({.offset_s = around_s + shift, .rate = rate, .correlation = sums.correlation()});
     }
   return places;
 }
@@ -103,11 +99,6 @@ std::size_t touches_in(const Even& course) {
   }
   return count;
 }
-
-// The shift and rate about the middle, and their deviations.
-struct Refined {
-  double shift_s, rate, shift_deviation_s, rate_deviation, correlation;
-};
 
 // Least squares of film = rest + gain sensor(t) + bent sensor(t)^2, t = middle + shift + rate (film's time -
 // middle).
@@ -131,7 +122,8 @@ Vector solved(Matrix a, Vector y) {
   return y;
 }
 
-Refined refine(const Even& sensor, const Even& film, double middle_s, const Place& from) {
+// Its offset, too, is that at the film's middle.
+FilmClock refine(const Even& sensor, const Even& film, double middle_s, const FilmClock& from) {
   Vector unknown = {from.offset_s, from.rate, 1, 0, 0};
   Matrix normal;
   struct Second {  // sums of weight residual jacobian, and of weight jacobian jacobian
@@ -180,7 +172,11 @@ Refined refine(const Even& sensor, const Even& film, double middle_s, const Plac
     const Vector moved = solved(others, second.score);
     of_shift += moved[kShift] * moved[kShift], of_rate += moved[kRate] * moved[kRate];
   }
-  return {unknown[kShift], unknown[kRate], std::sqrt(of_shift), std::sqrt(of_rate), sums.correlation()};
+  return {.offset_s = unknown[kShift],
+          .rate = unknown[kRate],
+          .offset_deviation_s = std::sqrt(of_shift),
+          .rate_deviation = std::sqrt(of_rate),
+          .correlation = sums.correlation()};
 }
 
 [[noreturn]] void refuse(const std::string& why) {
@@ -206,27 +202,24 @@ FilmClock find_film_clock(const LoadCourse& sensor, const LoadCourse& film) {
   const bool overlap =
       sensor.time_s.front() < film.time_s.back() && film.time_s.front() < sensor.time_s.back();
   const double around = overlap ? 0 : sensor.time_s.front() - film.time_s.front();
-  const std::vector<Place> places = tried(coarse_sensor, coarse_film, around, middle);
+  const std::vector<FilmClock> places = tried(coarse_sensor, coarse_film, around, middle);
   if (places.empty()) refuse("they have fewer than " + format(kFarthestS) + " s in common");
-  const Place best = *std::ranges::max_element(places, {}, &Place::correlation);
-  for (const Place& other : places)
+  const FilmClock best = *std::ranges::max_element(places, {}, &FilmClock::correlation);
+  for (const FilmClock& other : places)
     if (std::abs(other.offset_s - best.offset_s) > 0.4 && other.correlation > 0.93 * best.correlation)
       refuse("offsets of " + format(best.offset_s, 2) + " and " + format(other.offset_s, 2) + " s fit alike");
   Even fine_sensor(sensor, kFineS), fine_film(film, kFineS);
   fine_sensor.smooth(11), fine_film.smooth(11);
-  const Refined fine = refine(fine_sensor, fine_film, middle, best);
+  FilmClock fine = refine(fine_sensor, fine_film, middle, best);
   if (!(fine.correlation >= 0.8))
     refuse("their total loads have a correlation of " + format(fine.correlation, 2) +
            ", expected 0.8 or more");
-  if (!(fine.shift_deviation_s <= 0.004 && fine.rate_deviation <= 4e-4))
-    refuse("the offset stays uncertain by " + format(fine.shift_deviation_s, 3) + " s, the rate by " +
+  if (!(fine.offset_deviation_s <= 0.004 && fine.rate_deviation <= 4e-4))
+    refuse("the offset stays uncertain by " + format(fine.offset_deviation_s, 3) + " s, the rate by " +
            format(100 * fine.rate_deviation, 3) + " %");
   if (std::abs(fine.rate - 1) > kMostRate) refuse("a rate of " + format(fine.rate, 4));
-  return {.offset_s = middle + fine.shift_s - fine.rate * middle,
-          .rate = fine.rate,
-          .offset_deviation_s = fine.shift_deviation_s,
-          .rate_deviation = fine.rate_deviation,
-          .correlation = fine.correlation};
+  fine.offset_s = middle + fine.offset_s - fine.rate * middle;
+  return fine;
 }
 
 namespace {
@@ -257,10 +250,20 @@ void keep_only(std::vector<Value>& values, std::size_t each, const std::vector<s
   values.resize(frames.size() * each);
 }
 
-void check_times(const std::string& path, std::span<const double> times) {
-  for (std::size_t r = 0; r < times.size(); ++r)
-    if (!std::isfinite(times[r]) || (r > 0 && times[r] <= times[r - 1]))
+std::size_t time_column(const Table& table) {
+  const auto named = std::ranges::find(table.names, "time");
+  return named == table.names.end() ? 0 : static_cast<std::size_t>(named - table.names.begin());
+}
+
+std::vector<double> increasing_times(const std::string& path, const Table& table) {
+  std::vector<double> times;
+  for (std::size_t r = 0; r < table.rows(); ++r) {
+    const double t = table.row(r)[time_column(table)];
+    if (!std::isfinite(t) || (r > 0 && t <= times.back()))
       throw FileError(path, "has times that do not increase, in row " + std::to_string(r));
+    times.push_back(t);
+  }
+  return times;
 }
 
 // Each frame's truth from the images before and after it; frames that the film did not see are left out.
@@ -293,17 +296,11 @@ std::vector<double> take_film_times(const std::string& path, Table& film, const 
   const std::size_t pixels = film.columns - 1;
   for (const int scale : {2, 4, 8, 16}) {
     if (pixels != static_cast<std::size_t>(array.taxels() * scale * scale)) continue;
-    const bool named = std::ranges::find(film.names, "time") != film.names.end();
-    const std::size_t column = named ? film.column("time") : 0;
-    std::vector<double> times, values;
-    for (std::size_t r = 0; r < film.rows(); ++r) {
-      const auto row = film.row(r);
-      times.push_back(row[column]);
-      for (std::size_t c = 0; c < row.size(); ++c)
-        if (c != column) values.push_back(row[c]);
-    }
-    check_times(path, times);
-    film.values = std::move(values), film.columns = pixels;
+    std::vector<double> times = increasing_times(path, film);
+    std::size_t place = 0;
+    std::erase_if(film.values,
+                  [&, column = time_column(film)](double) { return place++ % film.columns == column; });
+    film.columns = pixels;
     film.shape = {static_cast<std::size_t>(array.rows * scale),
                   static_cast<std::size_t>(array.columns * scale)};
     return times;
@@ -315,14 +312,10 @@ std::vector<double> take_film_times(const std::string& path, Table& film, const 
 }
 
 std::vector<double> film_times(const std::string& path, const Table& times, const Table& images) {
-  const bool named = std::ranges::find(times.names, "time") != times.names.end();
-  if (!named && times.columns != 1)
+  if (times.columns != 1 && std::ranges::find(times.names, "time") == times.names.end())
     throw FileError(
         path, "has " + std::to_string(times.columns) + " columns, expected one of times, or a name: time");
-  std::vector<double> film_s;
-  for (std::size_t r = 0; r < times.rows(); ++r)
-    film_s.push_back(times.row(r)[named ? times.column("time") : 0]);
-  check_times(path, film_s);
+  std::vector<double> film_s = increasing_times(path, times);
   if (film_s.size() != images.rows())
     throw FileError(path, "holds " + std::to_string(film_s.size()) + " times, expected one for each of " +
                               std::to_string(images.rows()) + " images");

@@ -12,30 +12,7 @@
 
 namespace supertac {
 
-// --- The rig's recordings as its authors published them: lines of 16 voltages.
-
-/// What was found in a text recording.
-struct ImportReport {
-  std::size_t lines = 0, empty = 0;  ///< of the file; blank ones
-  std::size_t frames = 0;            ///< lines kept
-  /// Lines with fewer or more than 16 columns (cut by another, glued together), or one that is no number from
-  /// 0 to rig::kAdcVolts.
-  std::size_t dropped() const { return lines - empty - frames; }
-};
-
-/// Reads a text recording: one frame per line, 16 columns of volts, taxel 0 to 15, separated by spaces, tabs
-/// or commas. Lines that are not such a frame are dropped and counted, never repaired: a short line and the
-/// rest of it on another cannot be told from halves of different frames.
-///
-/// The files have no time stamps. Frame i, counted over *all* non-blank lines so that a dropped line leaves a
-/// gap, gets i / rig::kFrameRateHz; metadata "time_base" is "nominal" until a registration replaces it. What
-/// the host lost without leaving a line - 5 to 20 % of the frames - is for restore_clock
-/// (data/registration/pass_features.h). Positions are unknown. plate, trial, pass are left for the caller;
-/// source is "imported". Throws FileError when the file cannot be read, is empty or over 64 MiB, or more than
-/// a tenth of its lines are not frames: then it is another kind of file. `report` is filled even then.
-Recording import_text_pass(const std::string& path, ImportReport& report);
-
-// --- Tables, and pairs of images.
+// --- Tables, the rig's text files, and pairs of images.
 
 /// Numbers in rows and columns, as other programs write them.
 struct Table {
@@ -59,6 +36,19 @@ struct Table {
 /// number, are dropped and counted. Throws FileError: more than 4 GiB, another format, more than a tenth of
 /// the lines dropped, no row.
 Table read_table(const std::string& path);
+
+/// A recording of the rig as its authors published it: lines of 16 voltages, taxel 0 to 15, in any form of
+/// text that read_table() knows. Lines that are no 16 numbers from 0 to rig::kAdcVolts are dropped and
+/// counted, never repaired: a short line and the rest of it on another cannot be told from halves of
+/// different frames.
+///
+/// The files have no time stamps. Frame i, counted over *all* lines that are not empty, so that a dropped one
+/// leaves a gap, gets i / rig::kFrameRateHz; metadata "time_base" is "nominal" until a registration replaces
+/// it. What the host lost without leaving a line - 5 to 20 % of the frames - is for restore_clock
+/// (data/registration/pass_features.h). Positions are unknown. plate, trial, pass are left for the caller;
+/// source is "imported". Throws FileError as read_table(), for other columns, and where more than a tenth of
+/// the lines are dropped.
+Recording import_text_pass(const std::string& path, std::size_t& dropped);
 
 /// Which columns of a table hold what, each by its name or its number from 0.
 struct ColumnMap {
@@ -95,7 +85,7 @@ void add_truth(Recording& recording, const std::string& path, const Table& image
 /// Recordings with measured truth from pairs of a low- and a high-resolution image, a safetensors file with
 ///   input   F32 [N,C,H,W]    what the sensor gave: N frames of H x W taxels, C channels
 ///   target  F32 [N,1,sH,sW]  what a finer sensor saw of each, in [0,1]; s is 2, 4, 8 or 16
-///   group   I64 or I32 [N]   optional: frames of one person, object or day belong together
+///   group   I64 [N]          optional: frames of one person, object or day belong together
 /// Each group becomes a recording, whose plate and metadata "group" are the group's number with as many
 /// digits as the longest; without groups there is one, and its plate is "pairs". The times of the frames are
 /// unknown: they are set one second apart, and there is no trial. `sensor` says what the numbers mean;

@@ -50,17 +50,6 @@ void check_values(const SafetensorsFile& file, const char* name, std::span<const
                                    format(*odd) + ", expected " + expected);
 }
 
-template <class Whole>
-std::vector<std::int64_t> whole_numbers(std::span<const std::byte> bytes) {
-  std::vector<std::int64_t> values;
-  for (std::size_t at = 0; at < bytes.size(); at += sizeof(Whole)) {
-    Whole value;
-    std::memcpy(&value, bytes.data() + at, sizeof value);
-    values.push_back(value);
-  }
-  return values;
-}
-
 // The frames of each group, by its name; all digits are as many, so that names sort as numbers do.
 std::map<std::string, std::vector<std::size_t>> groups_of(const SafetensorsFile& file, std::uint64_t count) {
   const auto found = file.tensors().find("group");
@@ -70,11 +59,11 @@ std::map<std::string, std::vector<std::size_t>> groups_of(const SafetensorsFile&
     return groups;
   }
   const auto& [dtype, shape, begin, end] = found->second;
-  if (shape != Shape{count} || (dtype != "I64" && dtype != "I32"))
+  if (shape != Shape{count} || dtype != "I64")
     throw FileError(file.path(), "tensor 'group' is " + dtype + " " + shape_text(shape) + ", expected I64 [" +
                                      std::to_string(count) + "]");
-  const std::vector<std::int64_t> numbers = dtype == "I64" ? whole_numbers<std::int64_t>(file.bytes("group"))
-                                                           : whole_numbers<std::int32_t>(file.bytes("group"));
+  std::vector<std::int64_t> numbers(count);
+  std::memcpy(numbers.data(), file.bytes("group").data(), count * sizeof(std::int64_t));
   const std::size_t digits = std::to_string(std::ranges::max(numbers)).size();
   for (std::size_t i = 0; i < count; ++i) {
     std::string name = std::to_string(numbers[i]);

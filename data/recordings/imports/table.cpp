@@ -133,7 +133,7 @@ std::string other_than_table(const std::string& whole, const std::vector<std::st
                                        : "binary frames") +
            "; supertac-stream --sensor FILE --record DIR reads them, where \"port\" of the sensor's file is "
            "this one";
-  if (lines.empty()) return "";
+  if (lines.empty()) return whole.empty() ? "is empty, expected a row a line" : "";
   const auto numbers = std::ranges::count_if(lines, [](const std::string& line) {
     return holds_row(line) && line.find_first_not_of("0123456789+-.,;eE \t\r") == std::string::npos;
   });
@@ -223,6 +223,27 @@ Table read_table(const std::string& path) {
   FileReader file(path);
   if (file.size() > kMaxBytes) throw FileError(path, "is larger than 4 GiB; cut it into several");
   return numpy_table(path, file);
+}
+
+Recording import_text_pass(const std::string& path, std::size_t& dropped) {
+  const Table table = text_table(path);
+  Recording recording;
+  recording.source = "imported";
+  recording.metadata = {{"time_base", "nominal"}, {"filter_s", format(rig::kFilterS)}};
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    const auto volts = table.row(i);
+    if (volts.size() != rig::kTaxels ||
+        !std::ranges::all_of(volts, [](double v) { return v >= 0 && v <= rig::kAdcVolts; }))
+      continue;
+    recording.time_s.push_back(static_cast<double>(table.places[i] - 1) / rig::kFrameRateHz);
+    for (const double v : volts) recording.signals.push_back(static_cast<float>(v));
+  }
+  const std::size_t lines = table.rows() + table.dropped;
+  dropped = lines - recording.frames();
+  if (dropped * 10 <= lines) return recording;
+  throw FileError(path, std::to_string(dropped) + " of " + std::to_string(lines) +
+                            " lines are not 16 voltages from 0 to " + format(rig::kAdcVolts) +
+                            ", expected at most a tenth; is it a recording?");
 }
 
 }  // namespace supertac

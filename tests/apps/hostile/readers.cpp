@@ -145,8 +145,8 @@ std::vector<Reader> readers(const std::string& folder) {
       {"safetensors", recording, from_file([](const std::string& f) { (void)SafetensorsFile::read(f); })},
       {"recording", recording, from_file([](const std::string& f) { (void)read_recording(f); })},
       {"text", bytes_of(lines), from_file([](const std::string& f) {
-         ImportReport report;
-         (void)import_text_pass(f, report);
+         std::size_t dropped = 0;
+         (void)import_text_pass(f, dropped);
        })},
       {"table", bytes_of("ms,a,b,\"c\"\n# a remark\n0,1,2,3\n10,+1,2,3\n20,1,nan,3\n"),
        from_file([](const std::string& f) { (void)read_table(f); })},

@@ -105,9 +105,10 @@ TEST(TextFolder, APlateOfUnknownShapeIsImportedWithoutPositions) {
 TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {
   const TemporaryFolder folder;
   const std::string bad = put(folder, "plain/1/1.txt", "no numbers at all\n");
-  EXPECT_EQ(
-      what_of<FileError>([&] { import_all(folder.path(), {}); }),
-      bad + ": 1 of 1 lines are not 16 voltages from 0 to 3.3, expected at most a tenth; is it a recording?");
+  EXPECT_EQ(what_of<FileError>([&] { import_all(folder.path(), {}); }),
+            bad +
+                ": holds no line of numbers (too few lines); expected a row a line, separated by commas, "
+                "tabs or blanks");
   std::vector<std::string> left_out;
   const FolderImport lenient{.left_out = [&](const FileError& error) { left_out.push_back(error.what()); }};
   EXPECT_EQ(what_of<FileError>([&] { import_all(folder.path(), lenient); }),
@@ -115,7 +116,7 @@ TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {
   put(folder, "plain/1/2.txt", as_text(full_pass("plain", 2, 1)));
   EXPECT_EQ(import_all(folder.path(), lenient).size(), 1u);
   ASSERT_EQ(left_out.size(), 2u);
-  EXPECT_TRUE(left_out[1].starts_with(bad + ": 1 of 1 lines are not 16 voltages")) << left_out[1];
+  EXPECT_TRUE(left_out[1].starts_with(bad + ": holds no line of numbers")) << left_out[1];
 }
 
 // A published folder: remarks beside the passes, a plate in other letters, one that nobody knows.
@@ -161,7 +162,7 @@ TEST(TextFolder, TheSummaryTellsWhatBecameOfAPass) {
   ImportedPass pass{.path = "x", .plate = Plate::named("3_Bumps"), .plate_file = {}};
   pass.recording.trial = 2;
   pass.recording.pass = 4;
-  pass.lines = {.lines = 100, .empty = 1, .frames = 96};
+  pass.lines = 100, pass.dropped = 3;
   pass.registration.residual = 0.375;
   pass.registration.reason = "no taxel felt anything";
   const std::string start = "3_Bumps/2/4.txt  100 lines, 3 dropped, residual 0.38 mm, ";

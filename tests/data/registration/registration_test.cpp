@@ -227,11 +227,11 @@ TEST(Registration, RealPasses) {
   for (const auto& name : kRigPlates)
     for (int trial = 1; trial <= 2; ++trial)
       for (int pass = 1; pass <= (trial == 1 ? 8 : 4); ++pass) {
-        ImportReport report;
+        std::size_t dropped = 0;
         Recording recording =
             import_text_pass(std::string(folder) + "/" + name + "/" + std::to_string(trial) + "/" +
                                  std::to_string(pass) + ".txt",
-                             report);
+                             dropped);
         recording.pass = pass;
         recording.speed_mm_s = 10;
         restore_clock(recording, rig::kFrameRateHz);

@@ -277,4 +277,77 @@ TEST_F(TableImport, TruthIsScaledAndCounted) {
             "t: holds 2 images, the recording has 3 frames; expected one for each");
 }
 
+/// A line of the rig's text: voltages from `first` on.
+std::string line_of(double first) {
+  std::string line;
+  for (int k = 0; k < rig::kTaxels; ++k) line += std::to_string(first + 0.01 * k) + " ";
+  return line + "\n";
+}
+
+/// `count` good lines, the n-th starting with 2 + n / 1000 volts.
+std::string good_lines(int count) {
+  std::string text;
+  for (int i = 0; i < count; ++i) text += line_of(2 + 0.001 * i);
+  return text;
+}
+
+class TextImport : public TableImport {
+ protected:
+  Recording import_text(const std::string& text) { return import_text_pass(file(text, "1.txt"), dropped_); }
+  std::size_t dropped_ = 0;
+};
+
+TEST_F(TextImport, ReadsFramesInOrder) {
+  const Recording recording = import_text(good_lines(4));
+  ASSERT_EQ(recording.frames(), 4u);
+  EXPECT_FLOAT_EQ(recording.signals[0], 2.0F);
+  EXPECT_FLOAT_EQ(recording.signals[2 * rig::kTaxels + 5], 2.052F);
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_EQ(recording.time_s[i], static_cast<double>(i) / rig::kFrameRateHz);
+  EXPECT_TRUE(recording.position_mm.empty());
+  EXPECT_EQ(recording.metadata.at("time_base"), "nominal");
+  EXPECT_EQ(recording.source, "imported");
+}
+
+TEST_F(TextImport, DropsEveryKindOfBadLineAndLeavesAGap) {
+  const std::string good = line_of(2.0);
+  std::string text = good_lines(50) + good.substr(0, 30) + "\n" + good.substr(0, good.size() - 1) + good;
+  for (const char* first : {"2.12.2", "x", "nan", "24.4", "-0.1"})
+    text += first + good.substr(good.find(' '));
+  const Recording recording = import_text(text + "\n" + good_lines(50));
+  EXPECT_EQ(dropped_, 7u);
+  EXPECT_EQ(recording.frames(), 100u);
+  EXPECT_DOUBLE_EQ(recording.time_s[50], 57 / rig::kFrameRateHz);  // seven dropped frames, no blank line
+}
+
+TEST_F(TextImport, RefusesWhatIsNoRecording) {
+  const std::pair<std::string, std::string> cases[] = {
+      {"", "is empty, expected a row a line"},
+      {"Some text\nof another kind\n", "holds no line of numbers"},
+      {std::string(5000, '\0'), "holds no line of numbers"},
+      {std::string(1 << 20, '1'), "(no line ends in this text"},
+      {lines(20, "1 2 3\n"),
+       "20 of 20 lines are not 16 voltages from 0 to 3.3, expected at most a tenth; is"},
+      {good_lines(8) + line_of(4), "1 of 9 lines are not 16 voltages"}};
+  for (const auto& [text, refusal] : cases) EXPECT_ERROR(import_text(text), FileError, refusal);
+  EXPECT_EQ(import_text(good_lines(9) + line_of(4)).frames(), 9U);
+  EXPECT_EQ(what_of<FileError>([&] { import_text_pass("/nowhere/1.txt", dropped_); }),
+            "/nowhere/1.txt: cannot open the file: No such file or directory; check the name");
+}
+
+TEST_F(TextImport, RandomDamageEndsInARecordingOrAnError) {
+  const std::string text = good_lines(30);
+  const RandomStream random(5, 5);
+  for (std::uint64_t i = 0; i < 500; ++i) {
+    std::string damaged = text.substr(0, text.size() - (i % 5 == 0 ? 7 * i : 0));
+    for (std::uint64_t j = 0; j < 5; ++j)
+      damaged[random.bits(i * 10 + j) % damaged.size()] =
+          static_cast<char>(random.bits(1'000'000 + i * 10 + j));
+    try {
+      for (const float volts : import_text(damaged).signals) ASSERT_TRUE(volts >= 0 && volts <= 3.3F);
+    } catch (const FileError&) {
+    }
+  }
+}
+
 }  // namespace supertac::table_import_test
