@@ -5,7 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <map>
+#include <set>
 
 #include "apps/check/check.h"
 #include "apps/common/command_line/program.h"
@@ -55,41 +55,40 @@ int check_gradients(const Arguments& a) {
   throw FileError(program, std::string("cannot be run: ") + std::strerror(errno));
 }
 
-const std::map<std::string, std::vector<std::string>> kReadBy = {
-    {"FILE", {"file", "chain", "training", "step"}},
-    {"OTHER", {"file", "chain"}},
-    {"data", {"chain", "training", "step"}},
-    {"picture", {"chain"}},
-    {"segments", {"training"}},
-    {"seed", {"training"}},
-    {"step", {"step"}},
-    {"operator", {"step"}},
-    {"out", {"step"}}};
-
-void need(const Arguments& a, const std::string& name) {
-  if (!a.given(name)) throw UsageError(a.text("WHAT") + ": expected " + name + ", found none");
-}
+struct Job {
+  const char* name;
+  int (*run)(const Arguments&);
+  std::vector<std::string> needs = {}, reads = {};
+};
+const std::vector<Job> kJobs = {{"gradients", check_gradients},
+                                {"bits", check_bits},
+                                {"machine", check_machine},
+                                {"udev", print_udev_rule},
+                                {"file", check_file, {"FILE"}, {"OTHER"}},
+                                {"chain", check_chain, {"FILE", "OTHER"}, {"data", "picture"}},
+                                {"training", check_training, {"FILE", "data"}, {"segments", "seed"}},
+                                {"step", check_step, {"FILE", "data", "step"}, {"operator", "out"}}};
 
 }  // namespace
 
 int run(Arguments& a) {
-  const std::string what =
-      a.choice("WHAT", {"gradients", "bits", "machine", "udev", "file", "chain", "training", "step"});
-  for (const auto& [name, of] : kReadBy)
-    if (a.given(name) && std::ranges::find(of, what) == of.end())
+  std::vector<std::string> names;
+  std::set<std::string> read;  // by any
+  for (const Job& job : kJobs) {
+    names.emplace_back(job.name);
+    read.insert(job.needs.begin(), job.needs.end()), read.insert(job.reads.begin(), job.reads.end());
+  }
+  const std::string what = a.choice("WHAT", names);
+  const Job& job = *std::ranges::find(kJobs, what, &Job::name);
+  for (const std::string& name : job.needs) read.erase(name);
+  for (const std::string& name : job.reads) read.erase(name);
+  for (const std::string& name : read)
+    if (a.given(name))
       throw UsageError((name == "FILE" || name == "OTHER" ? in_quotes(a.text(name)) : "--" + name) +
                        ": nothing that " + what + " reads; leave it out");
-  if (what == "gradients") return check_gradients(a);
-  if (what == "bits") return check_bits(a);
-  if (what == "machine") return check_machine(a);
-  if (what == "udev") return print_udev_rule(a);
-  need(a, "FILE");
-  if (what == "file") return check_file(a);
-  need(a, what == "chain" ? "OTHER" : "data");
-  if (what == "chain") return check_chain(a);
-  if (what == "training") return check_training(a);
-  need(a, "step");
-  return check_step(a);
+  for (const std::string& name : job.needs)
+    if (!a.given(name)) throw UsageError(what + ": expected " + name + ", found none");
+  return job.run(a);
 }
 
 }  // namespace supertac

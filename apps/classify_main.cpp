@@ -233,11 +233,6 @@ class Tally {
     for (ClusterCount* c : {&clusters_[pass], &run_}) c->correct += label == answer ? 1 : 0, c->total += 1;
   }
   void end_run() { runs_.push_back(share({&run_, 1})), run_ = {}; }
-
-  // Share of right answers over all runs.
-  double accuracy() const { return share(clusters()); }
-  // For other passes of the same plates: a bootstrap over the passes.
-  Interval interval() const { return bootstrap_interval(clusters()); }
   // p-value of the difference to another tally of the same windows: sign flips over passes.
   double p_against(const Tally& other) const {
     std::vector<double> differences;
@@ -245,25 +240,22 @@ class Tally {
       differences.push_back(count.correct - other.clusters_.at(pass).correct);
     return sign_flip_p(differences);
   }
+  // Share of right answers over all runs, and, for other passes of the same plates, by a bootstrap over the
+  // passes, where it lies.
   nlohmann::ordered_json to_json() const {
     std::size_t all = 0;
-    for (const auto& [pass, count] : clusters_) all += static_cast<std::size_t>(count.total);
-    const Interval i = interval();
-    nlohmann::ordered_json json = {{"windows", all / runs_.size()},
-                                   {"passes", clusters_.size()},
-                                   {"accuracy", accuracy()},
-                                   {"ci95_passes", {i.low, i.high}},
-                                   {"accuracy_of_runs", runs_}};
-    return json;
+    std::vector<ClusterCount> clusters;
+    for (const auto& [pass, count] : clusters_)
+      clusters.push_back(count), all += static_cast<std::size_t>(count.total);
+    const Interval i = bootstrap_interval(clusters);
+    return {{"windows", all / runs_.size()},
+            {"passes", clusters.size()},
+            {"accuracy", share(clusters)},
+            {"ci95_passes", {i.low, i.high}},
+            {"accuracy_of_runs", runs_}};
   }
 
  private:
-  std::vector<ClusterCount> clusters() const {
-    std::vector<ClusterCount> all;
-    for (const auto& [pass, count] : clusters_) all.push_back(count);
-    return all;
-  }
-
   std::map<std::size_t, ClusterCount> clusters_;  // by pass
   ClusterCount run_;
   std::vector<double> runs_;
@@ -312,10 +304,11 @@ nlohmann::ordered_json report(const Arguments& a, const std::vector<View>& views
     for (std::size_t p = 0; p < std::size(kParts); ++p) {
       const Tally& tally = results[v][p];
       auto& part = json[name][kParts[p]] = tally.to_json();
-      const Interval i = tally.interval();
+      const auto percent = [](const auto& share) { return format(100 * share.template get<double>(), 1); };
       std::string line = left_aligned(name, 16) + left_aligned(kParts[p], 9) +
-                         right_aligned(format(100 * tally.accuracy(), 1), 6) + " % right, " +
-                         format(100 * i.low, 1) + "-" + format(100 * i.high, 1) + " for other passes";
+                         right_aligned(percent(part["accuracy"]), 6) + " % right, " +
+                         percent(part["ci95_passes"][0]) + "-" + percent(part["ci95_passes"][1]) +
+                         " for other passes";
       if (v > 0) {
         const double chance = tally.p_against(results.front()[p]);
         part["p_against_frame"] = chance;

@@ -46,6 +46,12 @@ SimulatorSettings read_settings(const Arguments& arguments, const Sensor& sensor
   return settings;
 }
 
+std::string file_of(const std::string& plate, int trial, int pass, double speed_mm_s = 0) {
+  Recording named;
+  named.plate = plate, named.trial = trial, named.pass = pass, named.speed_mm_s = speed_mm_s;
+  return recording_file_name(named);
+}
+
 std::vector<Job> plan_passes(const Arguments& arguments, const std::vector<Plate>& plates,
                              const SimulatorSettings& simulator, OutputFolder& folder) {
   std::vector<Job> jobs;
@@ -53,24 +59,16 @@ std::vector<Job> plan_passes(const Arguments& arguments, const std::vector<Plate
   const auto speeds = arguments.numbers("speeds", 0.5, rig::kFastestMmS);
   const int trials = static_cast<int>(arguments.integer("trials", 1, 1000));
   const int passes = static_cast<int>(arguments.integer("passes", 1, rig::kPasses));
-  for (const Plate& plate : plates) {
-    for (const double speed : speeds) {
-      for (int trial = 1; trial <= trials; ++trial) {
+  for (const Plate& plate : plates)
+    for (const double speed : speeds)
+      for (int trial = 1; trial <= trials; ++trial)
         for (int pass = 1; pass <= passes; ++pass) {
-          Recording named;
-          named.plate = plate.name();
-          named.trial = trial;
-          named.pass = pass;
-          named.speed_mm_s = speed;
           const PassSettings settings{.trial = trial, .pass = pass, .speed_mm_s = speed};
           jobs.push_back({[&plate, settings, &simulator, seed] {
                             return simulate_pass(plate, settings, simulator, seed);
                           },
-                          folder.add(recording_file_name(named))});
+                          folder.add(file_of(plate.name(), trial, pass, speed))});
         }
-      }
-    }
-  }
   return jobs;
 }
 
@@ -89,10 +87,8 @@ std::vector<Job> plan_presses(const Arguments& arguments, const Sensor& sensor, 
     for (Presses presses{.kind = kinds[i], .scale = scale}; left > 0; ++presses.number) {
       presses.count = std::min(left, kPressesOfARecording);
       left -= presses.count;
-      Recording named;
-      named.plate = presses.kind, named.trial = presses.number, named.pass = 1;
       jobs.push_back({[&sensor, presses, seed] { return simulate_presses(sensor, presses, seed); },
-                      folder.add(recording_file_name(named))});
+                      folder.add(file_of(presses.kind, presses.number, 1))});
     }
   }
   return jobs;

@@ -100,6 +100,16 @@ class Repetition {
     if (!theirs) return LedgerDifference{before, line_->step, "a line that is missing", false};
     return difference(ledger_, *theirs, *line_);
   }
+  /// start() and steps up to segment.to, with a progress bar, or to the first difference.
+  std::optional<LedgerDifference> repeat(const Segment& segment, const Arguments& a) {
+    auto d = start(segment.from);
+    const std::int64_t from = trainer_->step();
+    Progress progress(a, "repeating", static_cast<std::uint64_t>(segment.to - from), "steps");
+    for (; !d && trainer_->step() < segment.to;
+         progress.update(static_cast<std::uint64_t>(trainer_->step() - from)))
+      d = make_step();
+    return d;
+  }
   /// The line that the last step gave, if any.
   const std::optional<LedgerLine>& line() const { return line_; }
 
@@ -136,8 +146,7 @@ std::vector<Segment> drawn(std::vector<Segment> segments, std::size_t count, std
     std::swap(segments[i], segments[i + static_cast<std::size_t>(random.uniform(i) * rest)]);
   }
   segments.resize(std::min(count, segments.size()));
-  std::sort(segments.begin(), segments.end(),
-            [](const Segment& x, const Segment& y) { return x.from < y.from; });
+  std::ranges::sort(segments, {}, &Segment::from);
   return segments;
 }
 
@@ -170,17 +179,9 @@ int check_training(const Arguments& a) {
     wrong += d.has_value();
     rows.push_back(std::move(row));
   };
-  std::int64_t steps = 0, done = 0;
-  for (const Segment& s : chosen) steps += s.to - s.from;
-  std::optional<Progress> progress(std::in_place, a, "repeating", static_cast<std::uint64_t>(steps), "steps");
-  for (const Segment& s : chosen) {
-    auto d = training.start(s.from);
-    for (; !d && trainer.step() < s.to; progress->update(static_cast<std::uint64_t>(++done)))
-      d = training.make_step();
-    say("steps " + std::to_string(s.from) + " to " + std::to_string(s.to) + ": ", d,
+  for (const Segment& s : chosen)
+    say("steps " + std::to_string(s.from) + " to " + std::to_string(s.to) + ": ", training.repeat(s, a),
         {{"from", s.from}, {"to", s.to}});
-  }
-  progress.reset();
   auto last = training.start(trainer.total_steps());
   if (!last && !is_of(model, trainer.model()))
     last = LedgerDifference{trainer.step(), trainer.step(), "the model's file", false};
@@ -212,17 +213,6 @@ Json whose_name_begins(const Json& operators, const std::string& name) {
   return some;
 }
 
-// Repeats the training up to the step before this one.
-std::optional<LedgerDifference> go_before(Repetition& training, std::int64_t step, const Arguments& a) {
-  auto d = training.start(step - 1);
-  const std::int64_t from = training.trainer().step();
-  Progress progress(a, "repeating", static_cast<std::uint64_t>(step - from), "steps");
-  for (; !d && training.trainer().step() < step - 1;
-       progress.update(static_cast<std::uint64_t>(training.trainer().step() - from)))
-    d = training.make_step();
-  return d;
-}
-
 }  // namespace
 
 int check_step(const Arguments& a) {
@@ -232,7 +222,7 @@ int check_step(const Arguments& a) {
   Repetition training(a, model);
   Trainer& trainer = training.trainer();
   const std::int64_t step = a.integer("step", 1, trainer.total_steps());
-  auto d = go_before(training, step, a);
+  auto d = training.repeat({step - 1, step - 1}, a);
   OpenedStep opened;
   if (!d) {
     d = training.make_step([&] {

@@ -270,7 +270,6 @@ bool Stream::take(SensorFrame frame) {
   }
   const std::span<const float> picture = maker_->picture();
   if (picture.empty()) return true;
-  latency_.add(monotonic_seconds() - frame.arrived_s);
   keep(frame, picture);
   return true;
 }
@@ -278,20 +277,23 @@ bool Stream::take(SensorFrame frame) {
 // A frame with a signal that is no number has no place in a recording.
 void Stream::keep_raw(const SensorFrame& frame) {
   if (!std::ranges::all_of(frame.signals, [](float v) { return std::isfinite(v); })) return;
-  LiveFrame seen;
-  seen.number = frames_ - 1, seen.time_s = frame.time_s - first_s_, seen.signals = frame.signals;
-  seen.wall_s = frame.wall_s;
-  seen.arrival = frame.arrival;
+  const LiveFrame seen{.number = frames_ - 1,
+                       .time_s = frame.time_s - first_s_,
+                       .wall_s = frame.wall_s,
+                       .signals = frame.signals,
+                       .picture = {},
+                       .half_widths = {},
+                       .arrival = frame.arrival,
+                       .distance = {}};
   if (record_) record_->add(seen);
   if (recorder_) recorder_->add(seen);
-  if (maker_) return;
-  latency_.add(monotonic_seconds() - frame.arrived_s);
-  output(seen);
-  state_.number = seen.number, state_.time_s = seen.time_s;
-  state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
+  if (!maker_) output(frame, seen);
 }
 
-void Stream::output(const LiveFrame& seen) {
+void Stream::output(const SensorFrame& frame, const LiveFrame& seen) {
+  latency_.add(monotonic_seconds() - frame.arrived_s);
+  state_.number = seen.number, state_.time_s = seen.time_s;
+  state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
   if (log_) log_->add(seen);
   if (mcap_) mcap_->add(seen);
   if (!pipe_) return;
@@ -301,19 +303,16 @@ void Stream::output(const LiveFrame& seen) {
 }
 
 void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
-  const LiveFrame seen{.number = pictures() - 1,
-                       .time_s = frame.time_s - first_s_,
-                       .wall_s = frame.wall_s,
-                       .signals = maker_->signals(),
-                       .picture = picture,
-                       .half_widths = maker_->half_widths(),
-                       .distance = maker_->distance()};
   state_.unlike_training = maker_->unlike_training();
-  output(seen);
-  state_.number = seen.number, state_.time_s = seen.time_s;
   unlike_ += state_.unlike_training ? 1 : 0;
+  output(frame, {.number = pictures(),
+                 .time_s = frame.time_s - first_s_,
+                 .wall_s = frame.wall_s,
+                 .signals = maker_->signals(),
+                 .picture = picture,
+                 .half_widths = maker_->half_widths(),
+                 .distance = maker_->distance()});
   state_.picture.assign(picture.begin(), picture.end());
-  state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
   const Place& shown = places_.front();
   if (!map_ || !std::isfinite(shown.x_mm) || !std::isfinite(shown.y_mm) || shown.lift_mm > kLiftedMm) return;
   map_->add(shown.x_mm, shown.y_mm, picture, maker_->predicted_errors());

@@ -15,12 +15,11 @@
 #include <string>
 
 #include "apps/common/running/progress.h"
-#include "apps/stream/mcap_log.h"
 #include "apps/stream/picture_log.h"
 #include "apps/stream/picture_maker.h"
 #include "apps/stream/pressed_order.h"
 #include "apps/stream/raw_array.h"
-#include "apps/stream/views/line_output.h"
+#include "apps/stream/views/for_programs.h"
 #include "apps/stream/views/web_view.h"
 #include "data/map/named_map.h"
 
@@ -110,7 +109,7 @@ class Stream {
   double keep_pace(double time_s) const;
   void keep(const SensorFrame& frame, std::span<const float> picture);
   void keep_raw(const SensorFrame& frame);
-  void output(const LiveFrame& seen);
+  void output(const SensorFrame& frame, const LiveFrame& seen);
   void write_map() const;
   NamedMap named(MapCells cells) const;
   void complete();

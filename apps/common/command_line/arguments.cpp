@@ -20,16 +20,12 @@ namespace supertac {
 namespace {
 
 /// The options as cxxopts wants them; everything is text there, numbers are read locale-free afterwards.
-void add(cxxopts::Options& parser, const std::string& group, const std::string& name, const std::string& help,
-         const std::string& value, bool is_flag, const std::string& default_value) {
-  const std::string names = name == "help" ? "h,help" : name;
-  if (is_flag) {
-    parser.add_options(group)(names, help);
-  } else {
-    const auto type = cxxopts::value<std::string>();
-    parser.add_options(group)(names, help, default_value.empty() ? type : type->default_value(default_value),
-                              value);
-  }
+void add(cxxopts::Options& parser, const std::string& name, const auto& option) {
+  const std::string names = name == "help" ? "h,help" : name, group = option.is_more ? "more" : "";
+  const auto text = cxxopts::value<std::string>();
+  if (!option.default_value.empty()) text->default_value(option.default_value);
+  option.is_flag ? parser.add_options(group)(names, option.help)
+                 : parser.add_options(group)(names, option.help, text, option.value);
 }
 
 // The values that may name a file or folder.
@@ -59,21 +55,37 @@ std::string quoted_word(std::string_view word) {
   return quoted + "'";
 }
 
-/// Restricted Damerau-Levenshtein distance, by rows.
+/// Restricted Damerau-Levenshtein distance: of the first i and j letters, in a table.
 std::size_t distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
+  std::vector table(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i)
+    for (std::size_t j = 0; j <= b.size(); ++j) {
+      std::size_t& least = table[i][j] = i + j;
+      if (i == 0 || j == 0) continue;
+      least =
+          std::min({table[i - 1][j] + 1, table[i][j - 1] + 1, table[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
       const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
-      if (swapped) row[j] = std::min(row[j], before[j - 2] + 1);
+      if (swapped) least = std::min(least, table[i - 2][j - 2] + 1);
     }
-    before.swap(last);
-    last.swap(row);
+  return table.back().back();
+}
+
+/// The candidate with the fewest single-letter changes (insert, delete, replace, swap of neighbours) from
+/// `name`; empty when none is near: at most a third of its letters, at least two, may differ. Among equals,
+/// one that begins with `name`.
+std::string nearest_name(const std::string& name, const std::vector<std::string>& candidates) {
+  std::string nearest;
+  std::size_t fewest = name.size();  // a name all of whose letters differ is no hint
+  constexpr std::size_t kLongest = 64;
+  if (name.empty() || name.size() > kLongest) return nearest;
+  for (const std::string& candidate : candidates) {
+    const std::size_t changes = distance(name, candidate);
+    const bool nearer = changes < fewest || (changes == fewest && candidate.starts_with(name));
+    if (!nearer || changes > std::max<std::size_t>(2, candidate.size() / 3)) continue;
+    fewest = changes;
+    nearest = candidate;
   }
-  return last[b.size()];
+  return nearest;
 }
 
 std::string first_line(const std::string& path) {
@@ -107,21 +119,6 @@ std::optional<int> quota_of_cpu_max(std::string_view text) {
 }
 
 int default_threads() { return std::min(omp_get_max_threads(), quota()); }
-
-std::string nearest_name(const std::string& name, const std::vector<std::string>& candidates) {
-  std::string nearest;
-  std::size_t fewest = name.size();  // a name all of whose letters differ is no hint
-  constexpr std::size_t kLongest = 64;
-  if (name.empty() || name.size() > kLongest) return nearest;
-  for (const std::string& candidate : candidates) {
-    const std::size_t changes = distance(name, candidate);
-    const bool nearer = changes < fewest || (changes == fewest && candidate.starts_with(name));
-    if (!nearer || changes > std::max<std::size_t>(2, candidate.size() / 3)) continue;
-    fewest = changes;
-    nearest = candidate;
-  }
-  return nearest;
-}
 
 Arguments::Arguments(std::string program, std::string purpose)
     : program_(std::move(program)), purpose_(std::move(purpose)) {
@@ -160,9 +157,7 @@ std::string Arguments::help() const {
   for (std::size_t i = 0; i < order_.size(); ++i) {
     const std::string& name = order_[(i + common) % order_.size()];
     const Option& option = options_.at(name);
-    if (option.is_positional) continue;
-    add(parser, option.is_more ? "more" : "", name, option.help, option.value, option.is_flag,
-        option.default_value);
+    if (!option.is_positional) add(parser, name, option);
   }
   std::string text = parser.help();
   for (const std::string& name : positionals_) text += "\n  " + name + ": " + options_.at(name).help;
@@ -200,10 +195,7 @@ void Arguments::refuse_option(const std::string& name) const {
 void Arguments::parse(int argc, const char* const* argv) {
   for (int i = 0; i < argc; ++i) command_line_ += (i > 0 ? " " : "") + quoted_word(argv[i]);
   cxxopts::Options parser(program_, purpose_);
-  for (const std::string& name : order_) {
-    const Option& option = options_.at(name);
-    add(parser, "", name, option.help, option.value, option.is_flag, "");
-  }
+  for (const std::string& name : order_) add(parser, name, options_.at(name));
   parser.parse_positional(positionals_);
   try {
     const std::vector<std::string> words = complete_words(argc, argv);

@@ -35,11 +35,6 @@ auto read_option(const std::string& option, Work work) {
   return as_usage(work, "--" + option + ": ");
 }
 
-/// The candidate with the fewest single-letter changes (insert, delete, replace, swap of neighbours) from
-/// `name`; empty when none is near: at most a third of its letters, at least two, may differ. Among equals,
-/// one that begins with `name`.
-std::string nearest_name(const std::string& name, const std::vector<std::string>& candidates);
-
 /// How many threads a program takes when none are asked for: what OpenMP says (OMP_NUM_THREADS, else the
 /// processors of the affinity mask), at most the cgroup's CPU quota rounded up.
 int default_threads();

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <ctime>
 
-#include "apps/common/command_line/program.h"
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/hash.h"
@@ -36,6 +35,8 @@ std::string utc(std::time_t time) {
 std::string dumped(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 }  // namespace
+
+std::string version() { return SUPERTAC_VERSION; }
 
 void begin_provenance(const Arguments& a) {
   State& s = state();

@@ -14,7 +14,13 @@ namespace supertac {
 /// In a folder that a program fills: a line for each time that it was filled.
 inline constexpr char kFolderProvenance[] = "provenance.jsonl";
 
-/// For run_program(): from now on files say command, version, commit and seed.
+/// "0.2.0"
+std::string version();
+/// The commit the program was built from, "-dirty" when the tree had changes; "unknown" without git. Defined
+/// in a file that the build writes.
+const char* commit();
+
+/// For main(): from now on files say command, version, commit and seed.
 void begin_provenance(const Arguments& arguments);
 /// An input of what is written from now on, by its content: "recordings", "model", "journal", ... An input of
 /// the same name is replaced.

@@ -53,6 +53,8 @@ TEST(Arguments, MistakesAreNamed) {
   const std::pair<std::vector<const char*>, std::string> cases[] = {
       {{}, "missing FILE: a file"},
       {{"x", "--cuont", "3"}, "unknown option '--cuont'; did you mean '--count'?"},
+      {{"x", "--coun", "3"}, "unknown option '--coun'; did you mean '--count'?"},
+      {{"x", "--thread", "3"}, "unknown option '--thread'; did you mean '--threads'?"},
       {{"x", "--zzzzzz"}, "unknown option '--zzzzzz'"},
       {{"x", "--json", "--cuont"}, "unknown option '--cuont'; did you mean '--count'?"},
       {{"--x"}, "unknown option '--x'"},
@@ -74,15 +76,6 @@ TEST(Arguments, HelpShowsUnitsAndDefaultsAndNeedsNothing) {
   const std::string help = parsed({"--help"}).help();
   for (const char* text : {"FILE", "--count N", "(default: 3)", "--json FILE", "--threads N"})
     EXPECT_NE(help.find(text), std::string::npos) << text;
-}
-
-TEST(Nearest, NamesWhatWasMeantOrNothing) {
-  const std::vector<std::string> names = {"seed", "speeds", "trials", "threads"};
-  EXPECT_EQ(nearest_name("sede", names), "seed");
-  EXPECT_EQ(nearest_name("speed", names), "speeds");
-  EXPECT_EQ(nearest_name("thread", names), "threads");
-  EXPECT_EQ(nearest_name("epochs", names), "");
-  EXPECT_EQ(nearest_name("", names), "");
 }
 
 TEST(Threads, QuotaOfACgroup) {

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "io/files/file.h"
+#include "io/files/json.h"
 #include "tests/apps/common/process.h"
 
 namespace supertac {
@@ -40,42 +41,39 @@ inline ProcessResult succeed_in(const std::string& folder, const std::string& li
   return result;
 }
 
-/// A test with a folder of its own, in which programs run.
-class ProgramTest : public testing::Test {
+/// A folder in which programs run.
+class WithFolder : public testing::Test {
  protected:
-  ProcessResult run(const std::string& line, const ProcessOptions& how = {}) const {
-    return run_in(folder_.path(), line, how);
-  }
-  ProcessResult succeed(const std::string& line, const ProcessOptions& how = {}) const {
-    return succeed_in(folder_.path(), line, how);
-  }
-  std::string path(const std::string& name) const { return folder_ / name; }
-  std::string bytes(const std::string& name) const { return read_text_file(path(name), 1 << 26); }
-
-  TemporaryFolder folder_;
-};
-
-/// A small simulated data set that all tests of a suite share: one pass of each of two trials over 3_Bumps
-/// lie in path("data").
-class OnSimulatedData : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
-    succeed("supertac-simulate --out data --plates 3_Bumps --speeds 10 --passes 1");
-  }
-  static void TearDownTestSuite() { folder_.reset(); }
-
-  // In the folder.
   static ProcessResult run(const std::string& line, const ProcessOptions& how = {}) {
     return run_in(folder_->path(), line, how);
   }
   static ProcessResult succeed(const std::string& line, const ProcessOptions& how = {}) {
     return succeed_in(folder_->path(), line, how);
   }
+  static RunningProcess start(const std::string& line) { return start_in(folder_->path(), line); }
   static std::string path(const std::string& name) { return *folder_ / name; }
   static std::string bytes(const std::string& name) { return read_text_file(path(name), 1 << 26); }
+  static nlohmann::ordered_json json(const std::string& name) { return parse_json_limited(bytes(name)); }
 
   static inline std::unique_ptr<TemporaryFolder> folder_;
+};
+
+/// A test with a folder of its own.
+class ProgramTest : public WithFolder {
+ protected:
+  ProgramTest() { folder_ = std::make_unique<TemporaryFolder>(); }
+  ~ProgramTest() override { folder_.reset(); }
+};
+
+/// A small simulated data set that all tests of a suite share: one pass of each of two trials over 3_Bumps
+/// lie in path("data").
+class OnSimulatedData : public WithFolder {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    succeed("supertac-simulate --out data --plates 3_Bumps --speeds 10 --passes 1");
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
 };
 
 /// A small training on simulated data, for tests of what becomes of it.

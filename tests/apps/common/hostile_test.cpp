@@ -87,9 +87,8 @@ TEST_F(Outputs, ASecondWriterOfAFolderIsRefused) {
 TEST_F(Outputs, WhatAppearsMeanwhileIsNotReplaced) {
   succeed(kSimulate + "data");
   const std::vector<std::string> names = {"model.safetensors", "json.json"};
-  RunningProcess train =
-      start_in(folder_.path(), "supertac-train --data data --split window --preset tiny --epochs 1 --out " +
-                                   names[0] + " --json " + names[1]);
+  RunningProcess train = start("supertac-train --data data --split window --preset tiny --epochs 1 --out " +
+                               names[0] + " --json " + names[1]);
   wait_for_file(path("model.run/settings.json"));
   for (const std::string& name : names) write_file(path(name), "precious");
   const ProcessResult result = train.wait();
@@ -104,13 +103,9 @@ TEST_F(Outputs, WhatAppearsMeanwhileIsNotReplaced) {
 }
 
 TEST_F(Outputs, EmptyNamesAreRefused) {
-  for (const auto& [program, option] :
-       {std::pair{"supertac-plate", "--json"}, {"supertac-train", "--resume"}}) {
-    const auto result = run_process(program, {"--plate", "plain", "--out", "x", option, ""});
-    EXPECT_EQ(result.code, 2);
-  }
-  const auto resume = run_process("supertac-train", {"--data", "x", "--out", "x", "--resume", ""});
-  EXPECT_TRUE(contains(resume.error, "--resume: expected FILE, found an empty name"));
+  EXPECT_EQ(run_process("supertac-plate", {"--plate", "plain", "--out", "x", "--json", ""}).code, 2);
+  expect_failure(run_process("supertac-train", {"--data", "x", "--out", "x", "--resume", ""}), 2,
+                 "--resume: expected FILE, found an empty name");
 }
 
 /// Runs a shell line with $BIN: only what a test needs a shell for.
@@ -244,9 +239,7 @@ TEST_F(Import, HoldsOnePlateAtATime) {
 TEST_F(Outputs, InAFolderOfAPlatesNameReplaceNoInput) {
   fs::create_directory(path("bumps6"));
   write_file(path("bumps6/plate.stl"), std::string("old"));
-  EXPECT_EQ(
-      shell("cd " + folder_.path() + " && $BIN/supertac-plate --plate bumps6 --out bumps6/plate.stl --force"),
-      0);
+  succeed("supertac-plate --plate bumps6 --out bumps6/plate.stl --force");
 }
 
 }  // namespace supertac::hostile_test

@@ -24,11 +24,10 @@ class Array : public ProgramTest {
   }
   // Two passes of such an array on the rig's dome, with its signals.
   void simulate(int rows, int columns, const std::string& pitch_mm) const {
-    write_file(path("dome.json"), R"({"rows": )" + std::to_string(rows) + R"(, "columns": )" +
-                                      std::to_string(columns) + R"(, "pitch_mm": )" + pitch_mm +
-                                      R"(, "unit": "V", "pressed": "lower", "range": [2.09, 2.45],
-      "rate_hz": 1008, "body": {"shape": "dome", "radius_mm": 47}, "frame": {"kind": "text"}})");
-    simulate("--sensor dome.json");
+    describe(
+        rows, columns, pitch_mm,
+        R"("V", "pressed": "lower", "range": [2.09, 2.45], "rate_hz": 1008, "body": {"shape": "dome", "radius_mm": 47})");
+    simulate("--sensor mat.json");
   }
   void train(const std::string& data) const {
     succeed("supertac-train --data " + data +
@@ -38,15 +37,17 @@ class Array : public ProgramTest {
     succeed("supertac-evaluate --data " + data +
             " --model m.safetensors --limit 40 --json scores.json --outputs outputs.safetensors "
             "--pictures pictures");
-    return nlohmann::json::parse(bytes("scores.json"));
+    return json("scores.json");
   }
   // The file of a sensor.
-  void write_mat(int rows, int columns, const std::string& pitch_mm,
-                 const std::string& range = "[40, 900]") const {
+  static void describe(int rows, int columns, const std::string& pitch_mm, const std::string& unit_and_more) {
     write_file(path("mat.json"), R"({"name": "mat", "rows": )" + std::to_string(rows) + R"(, "columns": )" +
                                      std::to_string(columns) + R"(, "pitch_mm": )" + pitch_mm +
-                                     R"(, "unit": "counts", "pressed": "higher", "range": )" + range +
-                                     R"(, "rate_hz": 100, "frame": {"kind": "text"}})");
+                                     R"(, "frame": {"kind": "text"}, "unit": )" + unit_and_more + "}");
+  }
+  static void write_mat(int rows, int columns, const std::string& pitch_mm,
+                        const std::string& range = "[40, 900]") {
+    describe(rows, columns, pitch_mm, R"("counts", "pressed": "higher", "rate_hz": 100, "range": )" + range);
   }
   Recording first_of(const std::string& data) const {
     return read_recording(list_recordings(path(data)).front());

@@ -184,7 +184,7 @@ TEST_F(Audit, TwoTrainingsPartAtAnOperator) {
     succeed("supertac-check step " + name + ".safetensors --data data --step 1 --json " + name + ".json");
   EXPECT_NE(compare("first.json second.json", "^0/[0-9]+\\.scale, the settings: "), 0);
   EXPECT_EQ(compare("first.json first.json", "^the same in "), 0);
-  auto fewer = nlohmann::json::parse(bytes("first.json"));
+  auto fewer = json("first.json");
   fewer["operators"].erase(fewer["operators"].size() - 1);
   write_file(path("fewer.json"), fewer.dump());
   EXPECT_NE(compare("first.json fewer.json", "step 1 of [0-9]+ operators and step 1 of [0-9]+ operators"), 0);

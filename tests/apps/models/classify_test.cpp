@@ -22,10 +22,10 @@ const std::string kClassify = "supertac-classify --data data --model ";
 
 TEST_F(Classify, CountsEveryTestWindowAndTellsTexturesApart) {
   succeed(kClassify + "trial --seeds 2 --epochs 20 --json scores.json");
-  const auto json = parse_json_limited(bytes("scores.json"));
-  EXPECT_EQ(json["split"], "trial");
+  const auto scores = json("scores.json");
+  EXPECT_EQ(scores["split"], "trial");
   for (const char* view : {"frame", "super_resolved", "latents"}) {
-    const auto& parts = json["views"][view];
+    const auto& parts = scores["views"][view];
     EXPECT_LT(parts["inside"]["windows"], parts["contact"]["windows"]) << view;
     EXPECT_LT(parts["contact"]["windows"], parts["all"]["windows"]) << view;
     EXPECT_EQ(parts["all"]["passes"], 4);
@@ -37,13 +37,13 @@ TEST_F(Classify, CountsEveryTestWindowAndTellsTexturesApart) {
 
   // Two plates that differ wherever one looks; passes of one trial.
   succeed(kClassify + "pass --seeds 1 --epochs 30 --json pass.json");
-  EXPECT_GT(parse_json_limited(bytes("pass.json"))["views"]["frame"]["inside"]["accuracy"], 0.65);
+  EXPECT_GT(json("pass.json")["views"]["frame"]["inside"]["accuracy"], 0.65);
 }
 
 TEST_F(Classify, SameBytesForOneAndTwoThreads) {
   for (const std::string threads : {"1", "2"})
     succeed(kClassify + "trial --seeds 2 --epochs 1 --threads " + threads + " --json " + threads);
-  const auto views = [](const char* name) { return parse_json_limited(bytes(name))["views"].dump(); };
+  const auto views = [](const char* name) { return json(name)["views"].dump(); };
   EXPECT_EQ(views("1"), views("2"));
 }
 

@@ -42,7 +42,6 @@ class Frames : public ProgramTest {
     return succeed("supertac-train --data data --out " + out +
                    " --preset frame --split group --epochs 2 --batch 16 " + more);
   }
-  nlohmann::json json(const std::string& name) const { return nlohmann::json::parse(bytes(name)); }
 };
 
 TEST_F(Frames, TrainScoreDrawAndReport) {
@@ -53,7 +52,7 @@ TEST_F(Frames, TrainScoreDrawAndReport) {
   const ProcessResult scored = succeed(
       "supertac-evaluate --model m.safetensors --data data --json scores.json --outputs "
       "outputs.safetensors --report report.html --pictures pictures");
-  const nlohmann::json scores = json("scores.json");
+  const auto scores = json("scores.json");
   EXPECT_EQ(scores["all"]["windows"], 12) << "a fifth of five groups";
   EXPECT_GT(scores["all"]["psnr_mean_db"], scores["baselines"]["bicubic"]["all"]["psnr_mean_db"]);
   EXPECT_GT(scores["baselines"]["bicubic"]["all"]["psnr_mean_db"],

@@ -72,8 +72,7 @@ class Mpi : public Training {
   }
   /// Does `harm` to that rank of four in mid-training; the run ends in time, and its state stays whole.
   static ProcessResult lose(int rank, const std::string& name, const std::function<void(pid_t)>& harm) {
-    RunningProcess run =
-        start_in(folder_->path(), SUPERTAC_MPIRUN + ranks(4, options(name + ".safetensors", "--epochs 400")));
+    RunningProcess run = start(SUPERTAC_MPIRUN + ranks(4, options(name + ".safetensors", "--epochs 400")));
     const std::string state = path(name + ".run/last.safetensors");
     wait_for_file(state);
     const pid_t process = process_of(path(name), rank);

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "io/files/safetensors.h"
+#include "io/numbers/text.h"
 #include "tests/apps/common/expect.h"
 #include "tests/support/test.h"
 
@@ -22,15 +23,14 @@ class Sweep : public OnSimulatedData {
   }
   // The cells of a column of a table, without its head.
   static std::vector<std::string> column_of(const std::string& csv, const std::string& name) {
-    std::vector<std::string> values;
-    const std::string head = csv.substr(0, csv.find('\n'));
-    std::istringstream lines(csv.substr(head.size() + 1));
+    std::vector<std::string> values, head;
+    std::istringstream lines(csv);
     for (std::string line; std::getline(lines, line);) {
-      std::istringstream columns(head), cells(line);
-      std::string value;
-      for (std::string column; std::getline(columns, column, ',') && std::getline(cells, value, ',');)
-        if (column == name) values.push_back(value);
+      const std::vector<std::string> cells = comma_list(line);
+      if (head.empty()) head = cells;
+      values.push_back(cells.at(static_cast<std::size_t>(std::ranges::find(head, name) - head.begin())));
     }
+    values.erase(values.begin());
     return values;
   }
 };

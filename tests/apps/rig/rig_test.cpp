@@ -26,8 +26,8 @@ class RigTest : public ProgramTest {
 
  private:
   ProcessResult plate_ = succeed("supertac-plate --plate ridges9 --out my.stl");
-  RunningProcess rig_ = start_in(
-      folder_.path(), "supertac-rig --plate my.stl --board-link board --printer-link printer --speedup 4");
+  RunningProcess rig_ =
+      start("supertac-rig --plate my.stl --board-link board --printer-link printer --speedup 4");
 };
 
 TEST_F(RigTest, CollectShowsALiveLineAndReportsEveryPass) {
@@ -35,7 +35,7 @@ TEST_F(RigTest, CollectShowsALiveLineAndReportsEveryPass) {
   EXPECT_TRUE(contains(collected.out, "pass 1: "));
   for (const char* part : {"collecting  [", " frames/s  ", " lost", "X99.7 Y"})
     EXPECT_TRUE(contains(collected.error, part));
-  const auto report = nlohmann::json::parse(bytes("report.json"));
+  const auto report = json("report.json");
   EXPECT_EQ(report["plate"], "my.stl");
   EXPECT_EQ(report["complete"], true);
   EXPECT_EQ(report["passes_done"], 1);

@@ -69,18 +69,20 @@ class FakeDevice {
   }
   void open_socket(int type, const std::string& prefix) {
     const int file = socket(AF_INET, type | SOCK_NONBLOCK, 0);
-    address_.sin_family = AF_INET, address_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof address_;
-    ASSERT_EQ(bind(file, reinterpret_cast<sockaddr*>(&address_), size), 0);
-    ASSERT_EQ(getsockname(file, reinterpret_cast<sockaddr*>(&address_), &size), 0);
-    port_ = prefix + std::to_string(ntohs(address_.sin_port));
+    sockaddr_in address{};
+    address.sin_family = AF_INET, address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    ASSERT_EQ(bind(file, reinterpret_cast<sockaddr*>(&address), size), 0);
+    ASSERT_EQ(getsockname(file, reinterpret_cast<sockaddr*>(&address), &size), 0);
+    port_ = prefix + std::to_string(ntohs(address.sin_port));
     if (type == SOCK_STREAM) {
       ASSERT_EQ(::listen(file, 1), 0);
       listening_ = file;
       return;
     }
-    close(file);  // the program listens there
     out_ = socket(AF_INET, SOCK_DGRAM, 0);
+    EXPECT_EQ(connect(out_, reinterpret_cast<sockaddr*>(&address), size), 0);
+    close(file);  // the program listens there
   }
   void open_fifo() {
     port_ = folder_ / "fifo";
@@ -102,23 +104,17 @@ class FakeDevice {
       std::this_thread::sleep_until(begin + std::chrono::duration<double>(n / sensor_.rate_hz));
       taken = connected();
       if (!taken) continue;
-      left_ = sent_frame(sensor_, values(n), n / sensor_.rate_hz);
-      while (!left_.empty() && !stop_) {
-        const bool datagram = listening_ < 0 && port_.starts_with("udp:");
-        const ssize_t count = datagram ? sendto(out_, left_.data(), left_.size(), 0,
-                                                reinterpret_cast<const sockaddr*>(&address_), sizeof address_)
-                                       : write(out_, left_.data(), left_.size());
-        if (count > 0) left_.erase(0, static_cast<std::size_t>(count));
+      const std::string bytes = sent_frame(sensor_, values(n), n / sensor_.rate_hz);
+      for (std::string_view left = bytes; !left.empty() && !stop_;) {
+        const ssize_t count = write(out_, left.data(), left.size());
+        if (count > 0) left.remove_prefix(static_cast<std::size_t>(count));
         if (count > 0) continue;
         taken = false;
         if (errno == EAGAIN) {
           usleep(1000);
           continue;
         }
-        left_.clear();
-        if (datagram || slave_ >= 0) break;
-        close(out_);
-        out_ = -1;  // the next client
+        if (slave_ < 0 && !port_.starts_with("udp:")) close(std::exchange(out_, -1));  // the next client
         break;
       }
     }
@@ -126,8 +122,7 @@ class FakeDevice {
 
   Sensor sensor_;
   TemporaryFolder folder_;
-  std::string port_, left_;
-  sockaddr_in address_{};
+  std::string port_;
   int listening_ = -1, out_ = -1, slave_ = -1;
   std::atomic<bool> stop_{false};
   std::thread thread_;

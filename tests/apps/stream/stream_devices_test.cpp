@@ -42,8 +42,8 @@ TEST_F(Streaming, AProgramThatWasStoppedStartsANewWindow) {
   wait_for_growth(path("capture"), kTwoSeconds / 2);
   running.send(SIGINT);
   ASSERT_EQ(running.wait().code, 130);
-  EXPECT_GE(result("json").at("gaps"), 1);
-  EXPECT_GE(result("json").at("suspect"), 1);
+  EXPECT_GE(json("json").at("gaps"), 1);
+  EXPECT_GE(json("json").at("suspect"), 1);
 }
 
 TEST_F(Streaming, ChunksOfAnAdapterCostLatencyAndNoPicture) {
@@ -51,12 +51,12 @@ TEST_F(Streaming, ChunksOfAnAdapterCostLatencyAndNoPicture) {
   settings.chunk_s = 0.1, settings.memory = 65536;
   plug_in(settings);
   ASSERT_EQ(stream("--board " + board() + " --seconds 5 --json json").code, 0);
-  const auto json = result("json");
-  EXPECT_EQ(json.at("gaps"), 0);
+  const auto result = json("json");
+  EXPECT_EQ(result.at("gaps"), 0);
   // All but those of the first window, and of the burst that had waited for somebody to listen.
-  const double made = json.at("pictures").get<double>() + json.at("dropped").get<double>();
-  EXPECT_GT(made, json.at("frames").get<double>() - 32 / 300.0 / rig::kFramePeriodS - 450);
-  EXPECT_GT(json.at("pictures"), 0);
+  const double made = result.at("pictures").get<double>() + result.at("dropped").get<double>();
+  EXPECT_GT(made, result.at("frames").get<double>() - 32 / 300.0 / rig::kFramePeriodS - 450);
+  EXPECT_GT(result.at("pictures"), 0);
 }
 
 // Stopped as by Ctrl-Z, or on a machine that swaps: what is recorded is dated right, or left out and counted.
@@ -80,7 +80,7 @@ TEST_F(Streaming, StoppedForAWhileItRecordsWhatItCanDate) {
     const ProcessResult ended = running.wait();
     rig_.reset();  // whose thread counts frames until here
     ASSERT_EQ(ended.code, 130) << ended.error;
-    const Recording recording = read_recording(result("json").at("recording"));
+    const Recording recording = read_recording(json("json").at("recording"));
     std::vector<double> off_s;  // from the board's own time, as far as the clocks' zeros are apart
     for (std::size_t i = 0; i < recording.frames(); ++i)
       for (const std::uint64_t n : numbers.numbers_in(recording.signals, i))
@@ -88,7 +88,7 @@ TEST_F(Streaming, StoppedForAWhileItRecordsWhatItCanDate) {
     ASSERT_GT(off_s.size(), 1000U);
     const auto [least, most] = std::ranges::minmax(off_s);
     EXPECT_LT(most - least, 2 * PictureLog::kTrustedS) << "seed " << seed;
-    const std::string left_out = std::to_string(result("json").at("left_out").get<int>());
+    const std::string left_out = std::to_string(json("json").at("left_out").get<int>());
     EXPECT_EQ(recording.metadata.contains("left_out_frames") ? recording.metadata.at("left_out_frames") : "0",
               left_out);
     EXPECT_EQ(ended.out.find("frames left out, their time being uncertain") == std::string::npos,
@@ -107,7 +107,7 @@ TEST_F(Streaming, ASignalEndsItCleanly) {
     const ProcessResult result = running.wait();
     EXPECT_EQ(result.code, 128 + signal);
     EXPECT_EQ(result.error, "");
-    EXPECT_EQ(kept("out").f64("time_s").size(), this->result("json").at("pictures"));
+    EXPECT_EQ(kept("out").f64("time_s").size(), json("json").at("pictures"));
     fs::remove(path("capture"));
   }
 }

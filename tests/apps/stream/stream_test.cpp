@@ -25,15 +25,15 @@ TEST_F(Streaming, AReplayGivesThePicturesThatLiveHad) {
   ASSERT_EQ(live.code, 0) << live.error;
   const ProcessResult replayed = stream("--replay capture --seconds 1.5 --out replay");
   ASSERT_EQ(replayed.code, 0) << replayed.error;
-  const auto json = result("json");
+  const auto result = json("json");
   const SafetensorsFile first = kept("live"), again = kept("replay");
   const std::size_t pictures = first.f64("time_s").size();
-  EXPECT_EQ(json.at("pictures"), pictures);
+  EXPECT_EQ(result.at("pictures"), pictures);
   ASSERT_GT(pictures, 0U);
   const std::vector<double> times = again.f64("time_s");
   // Every picture of the replay, but those that a busy machine was too late for.
   EXPECT_LE(pictures, times.size());
-  EXPECT_GE(pictures + json.at("dropped").get<std::size_t>(), times.size());
+  EXPECT_GE(pictures + result.at("dropped").get<std::size_t>(), times.size());
   const std::vector<float> pixels = first.f32("pictures"), pixels_again = again.f32("pictures");
   std::size_t at = 0;
   for (std::size_t i = 0; i < pictures; ++i) {
@@ -64,10 +64,6 @@ TEST_F(Streaming, TheMapOfARecordingHasTheBitsOfTheWindowsMap) {
   EXPECT_GT(cells.region.height, 15);
   for (std::size_t i = 0; i < values.size(); ++i)
     ASSERT_EQ(std::bit_cast<std::uint32_t>(values[i]), std::bit_cast<std::uint32_t>(cells.values[i])) << i;
-  expect_failure(stream("--recording recording --map map.npy"), 2, "written as .png, .safetensors");
-  expect_failure(stream("--recording recording --elements bumps"), 2, "only with --map");
-  expect_failure(stream("--recording recording --map m.png --elements 3_Bumps"), 2,
-                 "one element in its middle");
   ASSERT_EQ(stream("--recording recording --map stated.safetensors --elements bumps").code, 0);
   const std::vector<float> stated = kept("stated.safetensors").f32("surface.values");
   ASSERT_EQ(stated.size(), values.size());
@@ -130,7 +126,7 @@ TEST_F(Streaming, TakesModelsOfAnyWindowAndRefusesWhatWasFilteredOtherwise) {
   for (const Dim timesteps : {64, 256}) {
     write_model(model(), timesteps, SimulatorSettings().filter_s);
     ASSERT_EQ(stream("--recording recording --json json --force").code, 0);
-    EXPECT_NEAR(result("json").at("pictures"), recording.frames() - timesteps, 5) << timesteps;
+    EXPECT_NEAR(json("json").at("pictures"), recording.frames() - timesteps, 5) << timesteps;
   }
   write_model(model(), kTimesteps, 0);
   expect_failure(stream("--recording recording"), 1, "moving average of 0.0992 s, the model was");
@@ -142,22 +138,29 @@ TEST_F(Streaming, TakesModelsOfAnyWindowAndRefusesWhatWasFilteredOtherwise) {
                  "signals are those of 2x6 taxels at 2 mm, the model was trained on 4x4 taxels at 3 mm");
 }
 
-TEST_F(Streaming, FilesThatAreMissingOrOfAnotherKindAreNamed) {
-  expect_failure(stream("--recording " + path("none")), 1, path("none"));
-  expect_failure(stream("--replay " + path("none")), 1, path("none"));
-  expect_failure(stream("--replay " + model()), 1, "expected a SuperTac journal");
-  expect_failure(stream("--replay /dev/zero"), 1, "is not a regular file");
-  expect_failure(stream("--recording " + model()), 1, model());
+TEST_F(Streaming, WrongUsageIsCode2AndWrongFilesAreNamed) {
+  struct Wrong {
+    std::string options;
+    int code;
+    std::string said;
+  };
+  for (const auto& [options, code, said] :
+       std::vector<Wrong>{{"", 2, "expected one of --sensor FILE, --board PORT"},
+                          {"--board a --replay b", 2, "found 2"},
+                          {"--replay a --capture b", 2, "--capture: only with --board"},
+                          {"--recording a --seconds 0", 2, "--seconds"},
+                          {"--recording recording --elements bumps", 2, "only with --map"},
+                          {"--recording recording --map map.npy", 2, "written as .png, .safetensors"},
+                          {"--recording r --map m.png --elements 3_Bumps", 2, "one element in its middle"},
+                          {"--board a", 1, "port a: no such port"},
+                          {"--recording none", 1, "none"},
+                          {"--replay none", 1, "none"},
+                          {"--replay model", 1, "expected a SuperTac journal"},
+                          {"--replay /dev/zero", 1, "is not a regular file"},
+                          {"--recording model", 1, "model"}})
+    expect_failure(stream(options), code, said);
   fs::remove(model());
   expect_failure(stream("--board " + board()), 1, "model: cannot open the file");
-}
-
-TEST_F(Streaming, WrongUsageIsExitCode2) {
-  expect_failure(stream(""), 2, "expected one of --sensor FILE, --board PORT");
-  expect_failure(stream("--board a --replay b"), 2, "found 2");
-  expect_failure(stream("--replay a --capture b"), 2, "--capture: only with --board");
-  expect_failure(stream("--recording a --seconds 0"), 2, "--seconds");
-  expect_failure(run("supertac-stream --board a"), 1, "port a: no such port");
 }
 
 TEST_F(Streaming, TooShortASignalSaysHowMuchIsNeeded) {

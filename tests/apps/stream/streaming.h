@@ -51,7 +51,7 @@ class Streaming : public ProgramTest {
   ProcessResult stream(const std::string& more, const ProcessOptions& options = {}) const {
     return run(line(more), options);
   }
-  RunningProcess start(const std::string& more) const { return start_in(folder_.path(), line(more)); }
+  static RunningProcess start(const std::string& more) { return ProgramTest::start(line(more)); }
 
   // A recording of the simulator up to there, and a model behind its filter.
   Recording record(double to_mm) const {
@@ -66,7 +66,6 @@ class Streaming : public ProgramTest {
     return *rig_;
   }
   SafetensorsFile kept(const std::string& name) const { return SafetensorsFile::read(path(name)); }
-  nlohmann::ordered_json result(const std::string& name) const { return parse_json_limited(bytes(name)); }
 
   std::unique_ptr<FaultyPtyRig> rig_;
 };

@@ -58,7 +58,7 @@ TEST_F(EvaluationPage, HoldsScoresWindowsAndWhatMadeIt) {
   const std::string mark = "type=\"application/json\">";
   const std::size_t begin = page.find(mark) + mark.size();
   const auto data = nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin));
-  auto scores = nlohmann::json::parse(bytes("r.json"));
+  auto scores = json("r.json");
   scores.erase("provenance");
   EXPECT_EQ(data["result"], scores);
   for (const char* some : {"best", "worst"}) {
