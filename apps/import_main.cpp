@@ -44,13 +44,6 @@ void refuse_others(const Arguments& arguments, const std::string& reason,
       throw UsageError(reason + ", found with " + (other == "INPUT" ? "" : "--") + other);
 }
 
-FolderImport import_settings(const Arguments& arguments, std::size_t& bad) {
-  FolderImport settings{.speed_mm_s = arguments.number("speed", 0.1, 1000)};
-  settings.left_out = [&](const FileError& error) { leave_out(arguments, error, bad); };
-  settings.progress = progress_of(arguments, "importing", "files");
-  return settings;
-}
-
 /// A file of tensors that is no recording; nothing where the input is anything else.
 std::optional<SafetensorsFile> pairs_of(const std::string& input) {
   if (!input.ends_with(".safetensors") || !std::filesystem::is_regular_file(input)) return std::nullopt;
@@ -109,6 +102,9 @@ int run(Arguments& arguments) {
   const std::string out = arguments.text("out");
   OutputFolder folder(arguments.output("out"));
   std::size_t bad = 0, reliable = 0, recordings = 0;
+  const FolderImport settings{.speed_mm_s = arguments.number("speed", 0.1, 1000),
+                              .left_out = [&](const FileError& error) { leave_out(arguments, error, bad); },
+                              .progress = progress_of(arguments, "importing", "files")};
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
   const auto keep = [&](const ImportedPass& pass) {
     const std::string name = recording_file_name(pass.recording);
@@ -120,11 +116,10 @@ int run(Arguments& arguments) {
     ++recordings;
   };
   // A plate at a time: no more is in memory, and what is done is on the disk.
-  import_text_folder(arguments.text("INPUT"), import_settings(arguments, bad),
-                     [&](const std::vector<ImportedPass>& plate) {
-                       for (const ImportedPass& pass : plate) keep(pass);
-                       keep_plate_file(plate.front().plate_file, folder.path());
-                     });
+  import_text_folder(input, settings, [&](const std::vector<ImportedPass>& plate) {
+    for (const ImportedPass& pass : plate) keep(pass);
+    keep_plate_file(plate.front().plate_file, folder.path());
+  });
   folder.keep();
   arguments.write_json({{"folder", out},
                         {"recordings", recordings},

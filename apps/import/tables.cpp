@@ -57,12 +57,10 @@ std::string companion(const Arguments& arguments, const std::string& option, con
   const fs::path folder = fs::path(named) / table.folder;
   const std::string stem = table.path.stem().string();
   std::string found;
-  for (const char* kind : kTables) {
-    const std::string path = (folder / (stem + kind)).string();
-    std::error_code none;
-    if (!fs::exists(path, none)) continue;
+  for (const fs::path& path : entries_of(folder, false)) {
+    if (path.stem() != stem || !is_table(path) || is_recording(path)) continue;
     if (!found.empty()) throw FileError(folder.string(), "holds two tables of the name " + stem);
-    found = path;
+    found = path.string();
   }
   if (found.empty())
     throw FileError(folder.string(), "holds no table of the name " + stem + " for --" + option);

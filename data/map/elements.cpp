@@ -33,8 +33,7 @@ class Hills {
   }
   std::optional<std::size_t> top_of(std::size_t cell) {
     if (parent_[cell] == kNone) return std::nullopt;
-    while (parent_[cell] != parent_[parent_[cell]]) parent_[cell] = parent_[parent_[cell]];
-    const std::size_t top = parent_[cell];
+    const std::size_t top = root(cell);
     if (values_[top] < kLowest || values_[cell] < kSaddle * values_[top]) return std::nullopt;
     return top;
   }
@@ -54,8 +53,8 @@ class Hills {
 
  private:
   static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
-  std::size_t root(std::size_t cell) const {
-    while (parent_[cell] != cell) cell = parent_[cell];
+  std::size_t root(std::size_t cell) {
+    while (parent_[cell] != cell) cell = parent_[cell] = parent_[parent_[cell]];
     return cell;
   }
   // The cell joins the highest hill beside it, and so do the hills whose saddle it is.

@@ -52,13 +52,6 @@ class Words {
     return text_.substr(begin, at_ - begin);
   }
   void skip_line() { at_ = std::min(text_.find_first_of("\r\n", at_), text_.size()); }
-  /// Whether the word comes anywhere behind this place.
-  bool any_left(std::string_view word) {
-    for (auto found = next(); !found.empty(); found = next())
-      if (same(found, word)) return true;
-    return false;
-  }
-
   void expect(std::string_view word) {
     if (const auto found = next(); !same(found, word)) reject(std::string(word), found);
   }
@@ -104,11 +97,7 @@ std::vector<Triangle> parse_text(std::string_view text, const std::string& name)
   std::vector<Triangle> triangles;
   Words words(text, name);
   for (auto word = words.next(); !word.empty(); word = words.next()) {
-    if (!Words::same(word, "solid")) {
-      // Remarks of the exporter behind the last solid; but not a solid whose first word is damaged.
-      if (triangles.empty() || words.any_left("facet")) words.reject("solid", word);
-      break;
-    }
+    if (!Words::same(word, "solid")) words.reject("solid", word);
     words.skip_line();  // the solid's name
     for (word = words.next(); Words::same(word, "facet"); word = words.next())
       triangles.push_back(parse_facet(words));
@@ -149,8 +138,6 @@ std::vector<Triangle> read_stl(const std::string& path) {
 }
 
 std::vector<std::byte> stl_bytes(const std::vector<Triangle>& triangles, std::string_view title) {
-  if (title.starts_with("solid"))
-    throw std::invalid_argument("stl_bytes: the title begins with \"solid\", which marks a text file");
   const std::size_t size = kHeadBytes + kFacetBytes * triangles.size();
   if (size > kMaxStlBytes)
     throw std::invalid_argument("stl_bytes: " + std::to_string(triangles.size()) +
@@ -314,11 +301,7 @@ void HeightMap::measure() {
   bool textured = false;
   for (std::size_t row = 0; row < rows_; ++row) {
     const double mean = row_mean(row);
-    float low = at(row, 0), high = low;
-    for (std::size_t column = 0; column < columns_; ++column) {
-      low = std::min(low, at(row, column));
-      high = std::max(high, at(row, column));
-    }
+    const auto [low, high] = std::ranges::minmax(std::span(z_).subspan(row * columns_, columns_));
     extent_.max_height = std::max(extent_.max_height, double{high});
     extent_.min_height = std::min(extent_.min_height, double{low});
     if (double{high} - mean > kUniformMm || mean - double{low} > kUniformMm) extent_.uniform_in_x = false;

@@ -23,7 +23,7 @@ constexpr float kMaxStlCoordinateMm = 1e6F;        ///< beyond any printer, and 
 /// The triangles of an STL file held in memory. A file is binary when its length is that of its count,
 /// 84 + 50 n bytes, whatever its first word; else it is text when it begins with "solid", whatever case,
 /// spaces or byte-order mark, and has no zero byte. Normals and attributes are not used; the text may hold
-/// several solids, lines end with LF, CR or both, and what follows the last solid does not matter.
+/// several solids and nothing else, lines end with LF, CR or both.
 /// `name`: of the file, for messages
 /// Throws FileError, naming the byte or the line: no STL, cut off, another count than the length allows, no
 /// triangle, coordinates that are no numbers or beyond kMaxStlCoordinateMm. No count is believed before it
@@ -34,8 +34,8 @@ std::vector<Triangle> parse_stl(std::span<const std::byte> bytes, const std::str
 std::vector<Triangle> read_stl(const std::string& path);
 
 /// A binary STL file's bytes, normals left at 0, which readers take from the corners (right-hand rule);
-/// `title` goes into its 80-byte header. Throws std::invalid_argument for a title that begins with "solid",
-/// by which readers would take the file for text, or more triangles than kMaxStlBytes hold.
+/// `title` goes into its 80-byte header; "solid" does not begin it, which marks a text file. Throws
+/// std::invalid_argument for more triangles than kMaxStlBytes hold.
 std::vector<std::byte> stl_bytes(const std::vector<Triangle>& triangles, std::string_view title);
 
 /// The upper surface of a model read from triangles, on a grid, as a surface to slide over. z = 0 is its flat

@@ -72,14 +72,11 @@ void append_run(const Recording& recording, const ResampleSettings& settings, st
 }  // namespace
 
 float Scaling::operator()(float signals) const {
-  return static_cast<float>(std::clamp((rest - signals) / span, 0.0, 1.0));
+  return static_cast<float>(std::min(std::max((rest - signals) / span, 0.0), 1.0));
 }
 
 void Scaling::operator()(std::span<float> signals) const {
-  // The same in the form that the compiler makes vectors of.
-  const double zero = rest, width = span;
-  for (float& v : signals)
-    v = static_cast<float>(std::min(std::max((zero - static_cast<double>(v)) / width, 0.0), 1.0));
+  for (float& v : signals) v = (*this)(v);
 }
 
 void FrameMean::clear() {
@@ -106,7 +103,7 @@ Track resample(const Recording& recording, const ResampleSettings& settings) {
     throw std::runtime_error("recording: " + *problem + "; record or import the pass again");
   Track track;
   const std::vector<double>& time = recording.time_s;
-  const double most_s = std::max(settings.max_gap_s, kGapPeriods * recording.period_s());
+  const double most_s = longest_silence_s(recording.period_s());
   for (std::size_t first = 0, end = 0; first < time.size(); first = end) {
     for (end = first + 1; end < time.size() && !settings.frames_apart && time[end] - time[end - 1] <= most_s;)
       ++end;

@@ -2,6 +2,7 @@
 // rate.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -93,18 +94,16 @@ struct Track {
   std::vector<std::uint32_t>
       run;               ///< [frames]: frames since the pass began or since the last gap, itself included
   std::size_t held = 0;  ///< frames for which no sample arrived: they repeat the one before
-  std::size_t gaps = 0;  ///< places where the recording is interrupted for longer than max_gap_s
+  std::size_t gaps = 0;  ///< places where the recording is interrupted: longest_silence_s()
   std::size_t frames() const { return run.size(); }
 };
 
-/// A silence of at most so many periods is never a gap, however slow the sensor.
-constexpr double kGapPeriods = 3;
+/// A longer silence of a sensor is a gap, never filled and crossed by no window: three of its periods, and
+/// 50 ms or more.
+inline double longest_silence_s(double period_s) { return std::max(0.05, 3 * period_s); }
 
 struct ResampleSettings {
   double rate_hz = 300;
-  /// Longer silence between two recorded frames is a gap, never filled; at least kGapPeriods of the
-  /// recording.
-  double max_gap_s = 0.05;
   bool frames_apart = false;  ///< each recorded frame is one sample of its own, whatever lies between
   Scaling scaling = {};
 };

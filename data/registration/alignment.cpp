@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "data/recordings/resample.h"
@@ -127,45 +128,31 @@ constexpr double kLeastAgreement = 0.5;
 constexpr double kDisagreement = 0.9, kGain = 0.05;
 constexpr double kLossEveryS = 0.2, kLossStepS = 0.1, kLongestLossS = 0.8;
 
-struct Change {
-  double shift_mm = 0, stretch_mm = 0;
-};
-
-struct Loss {
-  double at_s = 0, seconds = 0;
-};
-
-// y' = y + a + b (y - 54) / 26 of y = start + rate t is a line again.
-Registration changed(Registration r, const Change& change) {
-  const double stretch = change.stretch_mm / kHalfMm;
-  r.start_mm += change.shift_mm + stretch * (r.start_mm - kMiddleMm);
+// Its line moved by its shift and stretch: y' = y + a + b (y - 54) / 26 of y = start + rate t is a line
+// again.
+Registration moved(Registration r) {
+  const double stretch = r.stretch_mm / kHalfMm;
+  r.start_mm += r.shift_mm + stretch * (r.start_mm - kMiddleMm);
   r.rate *= 1 + stretch;
   return r;
 }
 
-struct Found {
-  Change change;
-  Loss loss;
-  double agreement = -1;
-};
-
-// Pattern search (Hooke & Jeeves 1961): steps along a and b, halved when none is better.
-Found best_change(const PassSignals& signals, const Registration& registration, const Profile& others,
-                  const Change& start) {
-  const auto score = [&](const Change& c, double& agreement) {
-    agreement = correlation(signals.along(changed(registration, c)), others);
-    const double shift = c.shift_mm / kUsualShiftMm, stretch = c.stretch_mm / kUsualStretchMm;
-    return agreement - kPenalty * (shift * shift + stretch * stretch);
+// The shift and stretch, from those that it has on, with which it agrees best with the others: pattern search
+// (Hooke & Jeeves 1961), steps along both, halved when none is better.
+Registration best_moved(const PassSignals& signals, const Registration& start, const Profile& others) {
+  const auto score = [&](Registration& r) {
+    r.agreement = correlation(signals.along(moved(r)), others);
+    const double shift = r.shift_mm / kUsualShiftMm, stretch = r.stretch_mm / kUsualStretchMm;
+    return r.agreement - kPenalty * (shift * shift + stretch * stretch);
   };
-  Found best;
-  best.change = start;
-  double highest = score(start, best.agreement);
+  Registration best = start;
+  double highest = score(best);
   for (double step = kFirstStepMm; step >= kLastStepMm;) {
     bool better = false;
-    for (const Change& move : {Change{step, 0}, Change{-step, 0}, Change{0, step}, Change{0, -step}}) {
-      Found tried;
-      tried.change = {best.change.shift_mm + move.shift_mm, best.change.stretch_mm + move.stretch_mm};
-      const double value = score(tried.change, tried.agreement);
+    for (const auto& [shift, stretch] : {std::pair(step, 0.0), {-step, 0}, {0, step}, {0, -step}}) {
+      Registration tried = best;
+      tried.shift_mm += shift, tried.stretch_mm += stretch;
+      const double value = score(tried);
       if (value > highest) highest = value, best = tried, better = true;
     }
     if (!better) step /= 2;
@@ -173,24 +160,17 @@ Found best_change(const PassSignals& signals, const Registration& registration, 
   return best;
 }
 
-// The line was fitted to contacts of both parts of the pass: it is about right in the longer one.
-Registration before_loss(Registration registration, const Loss& loss) {
-  const double middle_s = (registration.valid_from_s + registration.valid_until_s) / 2;
-  if (loss.at_s < middle_s) registration.start_mm -= registration.rate * loss.seconds;
-  return registration;
-}
-
 // The one loss of frames with which the pass agrees best with the others, if by much.
-Found with_loss(const PassSignals& signals, const Registration& registration, const Profile& others,
-                const Found& without) {
-  Found best = without;
+Registration with_loss(const PassSignals& signals, const Registration& without, const Profile& others) {
+  Registration best = without;
   const std::vector<double>& time = signals.time_s();
   for (double at = time.front() + kLossEveryS; at < time.back(); at += kLossEveryS) {
     for (double seconds = kLossStepS; seconds <= kLongestLossS; seconds += kLossStepS) {
-      const Loss loss{.at_s = at, .seconds = seconds};
-      Found tried = best_change(signals.delayed(loss.at_s, loss.seconds), before_loss(registration, loss),
-                                others, without.change);
-      tried.loss = loss;
+      Registration tried = without;
+      tried.lost_at_s = at, tried.lost_s = seconds;
+      // The line was fitted to contacts of both parts of the pass: it is about right in the longer one.
+      if (at < (tried.valid_from_s + tried.valid_until_s) / 2) tried.start_mm -= tried.rate * seconds;
+      tried = best_moved(signals.delayed(at, seconds), tried, others);
       if (tried.agreement > best.agreement) best = tried;
     }
   }
@@ -199,11 +179,10 @@ Found with_loss(const PassSignals& signals, const Registration& registration, co
 
 struct Aligned {
   Registration* result;
-  Registration registration;
+  Registration registration;  // where it was, and how it is to be moved
   PassSignals signals;
-  Found found;
 
-  Profile profile() const { return signals.along(changed(registration, found.change)); }
+  Profile profile() const { return signals.along(moved(registration)); }
 };
 
 std::vector<Profile> profiles_of(const std::vector<Aligned>& passes) {
@@ -215,11 +194,11 @@ std::vector<Profile> profiles_of(const std::vector<Aligned>& passes) {
 void take_medians_off(std::vector<Aligned>& passes) {
   std::vector<double> shifts, stretches;
   for (const Aligned& pass : passes) {
-    shifts.push_back(pass.found.change.shift_mm);
-    stretches.push_back(pass.found.change.stretch_mm);
+    shifts.push_back(pass.registration.shift_mm);
+    stretches.push_back(pass.registration.stretch_mm);
   }
   const double shift = median(shifts), stretch = median(stretches);
-  for (Aligned& pass : passes) pass.found.change.shift_mm -= shift, pass.found.change.stretch_mm -= stretch;
+  for (Aligned& pass : passes) pass.registration.shift_mm -= shift, pass.registration.stretch_mm -= stretch;
 }
 
 void align(std::vector<Aligned>& passes) {
@@ -227,10 +206,7 @@ void align(std::vector<Aligned>& passes) {
     const std::vector<Profile> profiles = profiles_of(passes);
     parallel_for(passes.size(), [&](std::size_t i) {
       Aligned& pass = passes[i];
-      const Loss loss = pass.found.loss;
-      pass.found =
-          best_change(pass.signals, pass.registration, mean_of_others(profiles, i), pass.found.change);
-      pass.found.loss = loss;
+      pass.registration = best_moved(pass.signals, pass.registration, mean_of_others(profiles, i));
     });
     take_medians_off(passes);
   }
@@ -240,12 +216,11 @@ bool find_losses(std::vector<Aligned>& passes) {
   const std::vector<Profile> profiles = profiles_of(passes);
   bool any = false;
   for (std::size_t i = 0; i < passes.size(); ++i) {
-    Aligned& pass = passes[i];
-    if (pass.found.agreement > kDisagreement || pass.found.agreement < kLeastAgreement) continue;
-    pass.found = with_loss(pass.signals, pass.registration, mean_of_others(profiles, i), pass.found);
-    if (pass.found.loss.seconds == 0) continue;
-    pass.signals = pass.signals.delayed(pass.found.loss.at_s, pass.found.loss.seconds);
-    pass.registration = before_loss(pass.registration, pass.found.loss);
+    auto& [result, registration, signals] = passes[i];
+    if (registration.agreement > kDisagreement || registration.agreement < kLeastAgreement) continue;
+    registration = with_loss(signals, registration, mean_of_others(profiles, i));
+    if (registration.lost_s == 0) continue;
+    signals = signals.delayed(registration.lost_at_s, registration.lost_s);
     any = true;
   }
   return any;
@@ -260,21 +235,15 @@ void align_passes(std::span<const RegisteredPass> passes) {
     if (pass.recording->array != TaxelArray{})
       throw std::invalid_argument("align_passes: expected recordings of the rig's " + TaxelArray{}.text() +
                                   ", got " + pass.recording->array.text());
-    reliable.push_back(
-        {pass.registration, *pass.registration, PassSignals(*pass.recording, *pass.registration), {}});
+    reliable.push_back({pass.registration, *pass.registration, {*pass.recording, *pass.registration}});
+    Registration& r = reliable.back().registration;
+    r.shift_mm = r.stretch_mm = r.lost_at_s = r.lost_s = 0;
   }
   if (reliable.size() < kFewestPasses) return;
   align(reliable);
   if (find_losses(reliable)) align(reliable);
-  for (const auto& [result, registration, signals, found] : reliable) {
-    if (found.agreement < kLeastAgreement) continue;
-    *result = changed(registration, found.change);
-    result->shift_mm = found.change.shift_mm;
-    result->stretch_mm = found.change.stretch_mm;
-    result->lost_at_s = found.loss.at_s;
-    result->lost_s = found.loss.seconds;
-    result->agreement = found.agreement;
-  }
+  for (const auto& [result, registration, signals] : reliable)
+    if (registration.agreement >= kLeastAgreement) *result = moved(registration);
 }
 
 }  // namespace supertac

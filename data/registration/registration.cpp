@@ -90,23 +90,41 @@ class Fit {
     for (Event& event : events_) event.time -= shift;
   }
 
-  std::size_t events() const { return events_.size(); }
-  double middle_s() const { return middle_s_; }
-  double speed() const { return speed_; }
-  const Stretch& stretch() const { return stretch_; }
+  bool felt_nothing() const { return events_.empty(); }
 
-  // Scores every start and rate; `best` is the winner, `rival` the best that means another place or another
-  // pitch.
-  void scan(Line& best, Line& rival) const {
+  // Of all starts and rates the best, refined; its margin is that before the best which means another place
+  // or another pitch.
+  Registration best(double filter_s) const {
     std::vector<Line> lines;
     for (double factor = kSlowest; factor < kFastest; factor *= 1 + kRateStep)
       for (double offset = -kMiddleReachMm; offset <= kMiddleReachMm; offset += kMiddleStepMm)
         lines.push_back(scored(rig::kPlateLengthMm / 2 + offset, speed_ * factor));
-    best = *std::ranges::max_element(lines, {}, &Line::score);
+    Line best = *std::ranges::max_element(lines, {}, &Line::score), rival;
     for (const Line& line : lines)
       if (elsewhere(line, best) && line.score > rival.score) rival = line;
+    const double margin = best.score - rival.score;
+    refine(best);
+    double w = 0, wdd = 0;
+    std::vector<bool> felt(crests_.size());
+    Registration r{.rate = best.rate,
+                   .matched = best.matched,
+                   .coverage = best.coverage,
+                   .margin = margin,
+                   .valid_from_s = stretch_.begin_s,
+                   .valid_until_s = stretch_.end_s};
+    for (const Event& event : events_) {
+      const Match m = match(event, best);
+      if (m.weight > 0) felt[m.crest] = true, ++r.contacts;
+      w += m.weight, wdd += m.weight * m.distance_mm * m.distance_mm;
+    }
+    r.residual = w > 0 ? std::sqrt(wdd / w) : 0;
+    r.elements = static_cast<int>(std::ranges::count(felt, true));
+    // Signals trail the finger: where a contact shows at t, the finger has been since t - delay.
+    r.start_mm = best.middle_mm - best.rate * middle_s_ + speed_ * filter_s / 2;
+    return r;
   }
 
+ private:
   // Weighted least squares with Tukey's biweight, repeated until the weights have settled.
   void refine(Line& line) const {
     for (int repeat = 0; repeat < 20; ++repeat) {
@@ -141,23 +159,6 @@ class Fit {
     return m;
   }
 
-  // Contacts used and their weighted rms distance.
-  void judge(const Line& line, Registration& out) const {
-    double w = 0, wdd = 0;
-    std::vector<bool> felt(crests_.size());
-    for (const Event& event : events_) {
-      const Match m = match(event, line);
-      if (m.weight > 0) felt[m.crest] = true;
-      out.contacts += m.weight > 0 ? 1 : 0;
-      w += m.weight, wdd += m.weight * m.distance_mm * m.distance_mm;
-    }
-    out.residual = w > 0 ? std::sqrt(wdd / w) : 0;
-    out.elements = static_cast<int>(std::count(felt.begin(), felt.end(), true));
-    out.matched = line.matched;
-    out.coverage = line.coverage;
-  }
-
- private:
   double pitch() const { return least_pitch(crests_, 12); }
 
   std::size_t nearest_crest(double y) const {
@@ -320,18 +321,8 @@ Registration register_pass(const Recording& recording, const Plate& plate) {
   if (plate.crests().empty()) return flagged("a plain plate has nothing to register against");
   if (recording.frames() < 3) return flagged("the recording is empty");
   const Fit fit(recording, plate);
-  if (fit.events() == 0) return flagged("no taxel felt anything");
-
-  Line best, rival;
-  fit.scan(best, rival);
-  result.margin = best.score - rival.score;
-  fit.refine(best);
-  fit.judge(best, result);
-  result.rate = best.rate;
-  // Signals trail the finger: where a contact shows at t, the finger has been since t - delay.
-  result.start_mm = best.middle_mm - best.rate * fit.middle_s() + fit.speed() * recording.filter_s() / 2;
-  result.valid_from_s = fit.stretch().begin_s;
-  result.valid_until_s = fit.stretch().end_s;
+  if (fit.felt_nothing()) return flagged("no taxel felt anything");
+  result = fit.best(recording.filter_s());
   judge(result, recording, plate);
   return result;
 }

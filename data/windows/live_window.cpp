@@ -13,16 +13,14 @@ LiveWindow::LiveWindow(const LiveWindowSettings& settings)
       resampler_(settings.signals, settings.rate_hz, settings.scaling),
       ring_(static_cast<std::size_t>(settings.timesteps) * settings.signals),
       mean_(settings.signals),
-      average_(settings.signals) {
-  settings_.max_gap_s = std::max(settings.max_gap_s, kGapPeriods * settings.frame_period_s);
-}
+      average_(settings.signals) {}
 
 void LiveWindow::push(double time_s, std::span<const float> frame) {
   if (frame.size() != settings_.signals)
     throw std::invalid_argument("live window: a frame has " + std::to_string(settings_.signals) +
                                 " signals, got " + std::to_string(frame.size()));
   if (!std::isfinite(time_s) || !std::ranges::all_of(frame, [](float v) { return std::isfinite(v); })) return;
-  if (!newest_s_ || std::abs(time_s - *newest_s_) > settings_.max_gap_s) {
+  if (!newest_s_ || std::abs(time_s - *newest_s_) > longest_silence_s(settings_.frame_period_s)) {
     if (newest_s_) ++gaps_;
     recent_s_.clear(), recent_.clear();
     resampler_.restart();

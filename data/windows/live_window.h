@@ -18,7 +18,6 @@ struct LiveWindowSettings {
   Scaling scaling = {};
   double filter_s = 0;                ///< moving average to apply to the frames; 0 = none
   double frame_period_s = 1.0 / 300;  ///< of the sensor
-  double max_gap_s = 0.05;            ///< longer silence is a gap no window crosses; at least kGapPeriods
 };
 
 /// From a sensor's frames to a network's window, as they come: filter, rate and scaling that training saw.
@@ -44,7 +43,7 @@ class LiveWindow {
   /// another size.
   bool window(std::span<float> out) const;
 
-  /// Silences, or steps back, longer than max_gap_s: all started anew.
+  /// Silences, or steps back, longer than longest_silence_s(): all started anew.
   std::size_t gaps() const { return gaps_; }
 
  private:

@@ -1,7 +1,6 @@
 #include "data/windows/split.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <set>
@@ -24,9 +23,10 @@ constexpr const char* kNames[] = {"window", "pass", "trial", "texture", "group",
 enum class Side : std::uint8_t { neither, train, test };
 
 // Numbers of the passes that have windows to test, by plate or group in alphabetical order.
-std::map<std::string, std::vector<std::size_t>> passes_by(std::string WindowSet::Pass::*key,
-                                                          const WindowSet& windows) {
-  std::map<std::string, std::vector<std::size_t>> numbers;
+using PassNumbers = std::map<std::string, std::vector<std::size_t>>;
+
+PassNumbers passes_by(std::string WindowSet::Pass::*key, const WindowSet& windows) {
+  PassNumbers numbers;
   for (std::size_t p = 0; p < windows.passes().size(); ++p) {
     const WindowSet::Pass& pass = windows.passes()[p];
     if (pass.windows > 0 && !pass.use.training_only) numbers[pass.*key].push_back(p);
@@ -37,6 +37,16 @@ std::map<std::string, std::vector<std::size_t>> passes_by(std::string WindowSet:
 std::size_t test_count(std::size_t count) {
   return std::max<std::size_t>(
       1, static_cast<std::size_t>(std::lround(kTestShare * static_cast<double>(count))));
+}
+
+// The first `count` names of a random order.
+std::vector<std::string> drawn(const PassNumbers& all, std::size_t count, std::uint64_t seed,
+                               std::uint64_t stream) {
+  const EpochOrder order(all.size(), seed, stream);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < count; ++i)
+    names.push_back(std::next(all.begin(), static_cast<std::ptrdiff_t>(order[i]))->first);
+  return names;
 }
 
 std::vector<Side> split_passes(const WindowSet& windows, std::uint64_t seed) {
@@ -64,8 +74,8 @@ std::vector<Side> split_trials(const WindowSet& windows) {
 }
 
 std::vector<Side> split_groups(const WindowSet& windows, std::uint64_t seed,
-                               const std::vector<std::string>& leave_out) {
-  const auto groups = passes_by(&WindowSet::Pass::group, windows);
+                               std::vector<std::string> leave_out) {
+  const PassNumbers groups = passes_by(&WindowSet::Pass::group, windows);
   if (groups.size() < 2 || groups.contains(""))
     throw std::invalid_argument(
         "split group: every recording needs metadata 'group' and there must be two groups, one to train on, "
@@ -73,31 +83,24 @@ std::vector<Side> split_groups(const WindowSet& windows, std::uint64_t seed,
         std::string(groups.contains("") ? "some have none: use split pass"
                                         : "there is one: use split window"));
   std::vector<Side> sides(windows.passes().size(), Side::train);
+  if (leave_out.empty()) leave_out = drawn(groups, test_count(groups.size()), seed, kWindowStream);
   for (const std::string& name : leave_out) {
     if (!groups.contains(name))
       throw std::invalid_argument("split group: the data has no group '" + name + "' to leave out; it has " +
                                   joined(groups, ", ", [](const auto& group) { return group.first; }));
     for (const std::size_t p : groups.at(name)) sides[p] = Side::test;
   }
-  if (!leave_out.empty()) return sides;
-  const EpochOrder order(groups.size(), seed, kWindowStream);
-  for (std::size_t i = 0; i < test_count(groups.size()); ++i)
-    for (const std::size_t p : std::next(groups.begin(), static_cast<std::ptrdiff_t>(order[i]))->second)
-      sides[p] = Side::test;
   return sides;
 }
 
 std::vector<Side> split_plates(const WindowSet& windows, std::uint64_t seed,
                                std::vector<std::string> leave_out) {
   std::vector<Side> sides(windows.passes().size(), Side::train);
-  const auto plates = passes_by(&WindowSet::Pass::plate, windows);
+  const PassNumbers plates = passes_by(&WindowSet::Pass::plate, windows);
   if (plates.size() < 2 && leave_out.empty())
     throw std::invalid_argument("split texture: the data has " + std::to_string(plates.size()) +
                                 " plate, needs two: one to train on, one to test on");
-  if (leave_out.empty())
-    leave_out.push_back(std::next(plates.begin(), static_cast<std::ptrdiff_t>(
-                                                      EpochOrder(plates.size(), seed, kPlateStream)[0]))
-                            ->first);
+  if (leave_out.empty()) leave_out = drawn(plates, 1, seed, kPlateStream);
   for (const std::string& name : leave_out) {
     const auto held_out = plates.find(name);
     if (held_out == plates.end())
@@ -124,24 +127,41 @@ Split split_windows(const WindowSet& windows, std::uint64_t seed) {
   std::vector<bool> tested(windows.size(), false);
   for (std::size_t i = 0; i < test_count(own.size()); ++i) tested[own[order[i]]] = true;
   Split split;
-  split.test.reserve(test_count(own.size()));
-  split.train.reserve(windows.size() - test_count(own.size()));
   for (std::uint32_t i = 0; i < windows.size(); ++i) (tested[i] ? split.test : split.train).push_back(i);
   return split;
 }
 
 Split split_by_pass(const WindowSet& windows, const std::vector<Side>& sides) {
   Split split;
-  for (const Side side : {Side::train, Side::test}) {
-    std::vector<std::uint32_t>& list = side == Side::test ? split.test : split.train;
-    std::size_t size = 0;
-    for (std::size_t p = 0; p < sides.size(); ++p) size += sides[p] == side ? windows.passes()[p].windows : 0;
-    list.reserve(size);  // growing takes twice the memory
-    for (std::size_t p = 0; p < sides.size(); ++p) {
-      const WindowSet::Pass& pass = windows.passes()[p];
-      for (std::size_t i = 0; sides[p] == side && i < pass.windows; ++i)
-        list.push_back(static_cast<std::uint32_t>(pass.first_window + i));
-    }
+  for (std::size_t p = 0; p < sides.size(); ++p) {
+    const WindowSet::Pass& pass = windows.passes()[p];
+    for (std::size_t i = 0; sides[p] != Side::neither && i < pass.windows; ++i)
+      (sides[p] == Side::test ? split.test : split.train)
+          .push_back(static_cast<std::uint32_t>(pass.first_window + i));
+  }
+  return split;
+}
+
+Split split_of(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
+               const std::vector<std::string>& leave_out) {
+  switch (kind) {
+    case SplitKind::window:
+      return split_windows(windows, seed);
+    case SplitKind::pass:
+      return split_by_pass(windows, split_passes(windows, seed));
+    case SplitKind::trial:
+      return split_by_pass(windows, split_trials(windows));
+    case SplitKind::texture:
+      return split_by_pass(windows, split_plates(windows, seed, leave_out));
+    case SplitKind::group:
+      return split_by_pass(windows, split_groups(windows, seed, leave_out));
+    case SplitKind::none:
+      break;
+  }
+  Split split;
+  for (std::uint32_t i = 0; i < windows.size(); ++i) {
+    split.train.push_back(i);
+    if (!windows.passes()[windows.pass_of(i)].use.training_only) split.test.push_back(i);
   }
   return split;
 }
@@ -160,30 +180,7 @@ std::string name_of(SplitKind kind) { return kNames[static_cast<std::size_t>(kin
 
 Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
                  const std::vector<std::string>& leave_out) {
-  Split split;
-  switch (kind) {
-    case SplitKind::window:
-      split = split_windows(windows, seed);
-      break;
-    case SplitKind::pass:
-      split = split_by_pass(windows, split_passes(windows, seed));
-      break;
-    case SplitKind::trial:
-      split = split_by_pass(windows, split_trials(windows));
-      break;
-    case SplitKind::texture:
-      split = split_by_pass(windows, split_plates(windows, seed, leave_out));
-      break;
-    case SplitKind::group:
-      split = split_by_pass(windows, split_groups(windows, seed, leave_out));
-      break;
-    case SplitKind::none:
-      for (std::uint32_t i = 0; i < windows.size(); ++i) {
-        split.train.push_back(i);
-        if (!windows.passes()[windows.pass_of(i)].use.training_only) split.test.push_back(i);
-      }
-      break;
-  }
+  Split split = split_of(windows, kind, seed, leave_out);
   if (split.train.empty() || split.test.empty())
     throw std::invalid_argument(
         "split " + name_of(kind) + ": no window to " + (split.train.empty() ? "train on" : "test on") +

@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/numbers/hash.h"
@@ -112,15 +113,13 @@ void choose_dropped(int at_most, const TaxelArray& array, const RandomStream& ra
 }  // namespace
 
 void check(const AugmentSettings& settings, const TaxelArray& array) {
-  const auto check_one = [](const char* name, double value) {
+  for (const auto& [name, value] : {std::pair("lift", settings.lift),
+                                    {"gain", settings.gain},
+                                    {"taxel_gain", settings.taxel_gain},
+                                    {"offset", settings.offset},
+                                    {"noise", settings.noise}})
     if (!(value >= 0) || !std::isfinite(value))
       throw std::invalid_argument(refusal("augmentation", name, "0 (off) or more", format(value)));
-  };
-  check_one("lift", settings.lift);
-  check_one("gain", settings.gain);
-  check_one("taxel_gain", settings.taxel_gain);
-  check_one("offset", settings.offset);
-  check_one("noise", settings.noise);
   if (settings.dropped < 0 || settings.dropped > array.taxels())
     throw std::invalid_argument(refusal("augmentation", "dropped", "0 to " + std::to_string(array.taxels()),
                                         std::to_string(settings.dropped)));

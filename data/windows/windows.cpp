@@ -28,7 +28,6 @@ void check(const WindowSettings& s) {
   require(s.scale == 2 || s.scale == 4 || s.scale == 8 || s.scale == 16, "scale", "2, 4, 8 or 16", s.scale);
   require(s.stride >= 1, "stride", "1 or more", s.stride);
   require(s.rate_hz > 0, "rate_hz", "more than 0", s.rate_hz);
-  require(s.max_gap_s > 0, "max_gap_s", "more than 0", s.max_gap_s);
   require(std::abs(s.scaling.span) > 0, "scaling.span", "a number other than 0", s.scaling.span);
   require(s.delay_s >= 0 && std::lround(s.delay_s * s.rate_hz) < s.timesteps, "delay_s",
           "0 to less than the window lasts", s.delay_s);
@@ -153,10 +152,9 @@ void WindowSet::add(const Recording& recording, const std::string& folder, const
   expect_array(recording);
   expect_unit(recording.signal_scale);
   Stored stored{.plate = plate_index(recording, folder)};
-  Track track = resample(recording, {.rate_hz = settings_.rate_hz,
-                                     .max_gap_s = settings_.max_gap_s,
-                                     .frames_apart = settings_.timesteps == 1,
-                                     .scaling = settings_.scaling});
+  Track track = resample(
+      recording,
+      {.rate_hz = settings_.rate_hz, .frames_apart = settings_.timesteps == 1, .scaling = settings_.scaling});
   delay_truth(track, delay_frames());
   Pass pass{.plate = recording.plate,
             .trial = recording.trial,

@@ -30,7 +30,6 @@ struct WindowSettings {
   std::optional<Body> body = {};                 ///< of what is simulated beside them: that of the first
   std::optional<float> contact_level = {};       ///< of measured truths; nothing: as contact_level() finds it
   int stride = 1;                                ///< every stride-th frame of a pass ends a window
-  double max_gap_s = 0.05;                       ///< longer silence in a recording is a gap no window crosses
 };
 
 /// Where the frames of the recordings went: frames is the sum of all that follow down to windows.

@@ -161,8 +161,7 @@ std::string self_test_hash(const ModelFile& file, double sensor_hz) {
                    .rate_hz = w.rate_hz,
                    .scaling = w.scaling,
                    .filter_s = file.input.filter_s.value_or(0),
-                   .frame_period_s = period,
-                   .max_gap_s = w.max_gap_s});
+                   .frame_period_s = period});
   std::uint32_t random = 1;
   std::vector<float> frame(file.array().signals());
   for (Dim i = 0, n = self_test_frames(file, sensor_hz); i < n; ++i) {
@@ -218,8 +217,7 @@ std::string window_constants(const ModelFile& file, double sensor_hz) {
   };
   return define("RATE_HZ", number(w.rate_hz), "of the window's samples") +
          define("PERIOD_S", number(period), "of the sensor's frames") +
-         define("MAX_GAP_S", number(std::max(w.max_gap_s, kGapPeriods * period)),
-                "a longer silence begins a new window") +
+         define("MAX_GAP_S", number(longest_silence_s(period)), "a longer silence begins a new window") +
          define("CELL_SLACK", number(kCellSlack), "of a sample: time stamps are rounded") +
          define("RAW_SPAN_S", number(raw_span), "of the moving average") +
          define("RAW_FRAMES", filter > 0 ? frames(raw_span) : "0") +

@@ -73,35 +73,30 @@ Table numpy_table(const std::string& path, FileReader& file) {
   if (header.find("'fortran_order': True") != std::string::npos)
     refuse("is in Fortran's order: save numpy.ascontiguousarray(array)");
   std::vector<std::size_t> shape;
-  for (std::string_view text = entry(header, "shape", "(", ')'); !text.empty();) {
-    std::string_view dim = text.substr(0, text.find(','));
-    text.remove_prefix(std::min(text.size(), dim.size() + 1));
-    while (dim.starts_with(' ')) dim.remove_prefix(1);
+  std::size_t numbers = 1;
+  for (const std::string& part : comma_list(std::string(entry(header, "shape", "(", ')')))) {
+    std::string_view dim = trimmed(part);
     if (dim.size() > 1 && dim.ends_with('L')) dim.remove_suffix(1);  // Python 2's long
     if (dim.empty()) continue;
     const auto value = parse_uint(dim);
     if (!value || *value < 1 || *value > kMaxBytes)
       refuse("has a side of " + in_quotes(dim) + ", expected 1 or more");
-    shape.push_back(*value);
+    if (*value > kMaxBytes / sizeof(double) / numbers)
+      refuse("holds more than " + std::to_string(kMaxBytes / sizeof(double)) +
+             " numbers; cut it into several");
+    shape.push_back(*value), numbers *= *value;
   }
   if (shape.size() < 1 || shape.size() > 4)
     refuse("is of rank " + std::to_string(shape.size()) + ", expected 1 to 4: rows first");
+  const std::uint64_t left = file.size() - prefix - length;
+  if (left != numbers * number->second.bytes)
+    refuse("holds " + std::to_string(left) + " bytes of values, its shape needs " +
+           std::to_string(numbers * number->second.bytes) + "; it is cut or damaged");
   Table table;
   table.shape.assign(shape.begin() + 1, shape.end());
-  table.columns = 1;
-  for (const std::size_t side : table.shape) {
-    if (side > kMaxBytes / sizeof(double) / table.columns)
-      refuse("has more than " + std::to_string(kMaxBytes / sizeof(double)) + " numbers in a row");
-    table.columns *= side;
-  }
-  const std::uint64_t left = file.size() - prefix - length;
+  table.columns = numbers / shape[0];
   const std::size_t row_bytes = table.columns * number->second.bytes;
-  if (left % row_bytes != 0 || left / row_bytes != shape[0])
-    refuse("holds " + std::to_string(left) + " bytes of values, its shape needs " + std::to_string(shape[0]) +
-           " x " + std::to_string(row_bytes) + "; it is cut or damaged");
-  if (shape[0] * table.columns > kMaxBytes / sizeof(double))
-    refuse("holds more than " + std::to_string(kMaxBytes / sizeof(double)) + " numbers; cut it into several");
-  table.values.reserve(shape[0] * table.columns);
+  table.values.reserve(numbers);
   const std::size_t rows_at_once = std::max<std::size_t>(1, (std::size_t{1} << 20) / row_bytes);
   std::vector<std::byte> rows;
   for (std::size_t i = 0; i < shape[0]; i += rows_at_once) {

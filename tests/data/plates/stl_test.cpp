@@ -4,7 +4,6 @@
 #include <ctime>
 
 #include "io/files/file.h"
-#include "io/numbers/random.h"
 #include "tests/data/test_recordings.h"
 #include "tests/fuzz/corpus.h"
 #include "tests/fuzz/stl_properties.h"
@@ -55,8 +54,8 @@ TEST(Stl, TextIsRecognisedAsFarAsItIsRead) {
   std::string capitals = text_stl(), old_mac = text_stl();
   for (char& c : capitals) c = static_cast<char>(std::toupper(c));
   std::ranges::replace(old_mac, '\n', '\r');
-  for (const std::string& text : {capitals, " \n\t" + text_stl(), "\xEF\xBB\xBF" + text_stl(), old_mac,
-                                  text_stl() + "exported by hand\n2026\n"})
+  for (const std::string& text :
+       {capitals, " \n\t" + text_stl(), "\xEF\xBB\xBF" + text_stl(), old_mac, text_stl() + "\n\n"})
     EXPECT_EQ(parse_stl(bytes_of(text), "plate.stl"), two_triangles()) << text;
   expect_refused(bytes_of(text_stl() + "sold next\n facet normal 0 0 1\n"), "expected solid, found 'sold'");
   expect_refused(bytes_of("solid\r\nfacet normal 0 0 1\r\nouter lop"), "line 3: expected loop");
@@ -75,8 +74,6 @@ TEST(Stl, LengthTellsBinaryFromTextWhateverTheFirstWord) {
   EXPECT_EQ(parse_stl(bytes, "plate.stl"), two_triangles());
   bytes.pop_back();  // now neither: cut off, and no text because of its zero bytes
   expect_refused(bytes, "announces 2 triangles, expected 184 bytes, found 183");
-  EXPECT_REFUSAL("stl_bytes: the title begins with \"solid\", which marks a text file",
-                 stl_bytes({}, "solid"));
 }
 
 TEST(Stl, DamagedBinaryNamesTheTriangleOrTheLength) {
@@ -281,30 +278,11 @@ TEST(PlateMesh, VolumeIsThatOfThePlate) {
   EXPECT_NEAR(volume_of(mesh_of(Plate::named("4_Blob"))), block + 16 * blob, 0.01 * 16 * blob);
 }
 
-// Written, read and looked at anywhere: what supertac-plate's help states.
-TEST(PlateMesh, WrittenAndReadHeightsAgree) {
-  const RandomStream random(11, 0);
-  for (const std::string& name : plates()) {
-    const Plate plate = Plate::named(name);
-    const Plate again = read(parse_stl(stl_bytes(mesh_of(plate), name), name), name);
-    EXPECT_NEAR(again.max_height(), plate.max_height(), 0.13) << name;  // a ridge's peak between two nodes
-    double squares = 0;
-    const int points = 20'000;
-    for (std::uint64_t i = 0; i < points; ++i) {
-      const double x = 36 * random.uniform(2 * i), y = 108 * random.uniform(2 * i + 1);
-      const double error = again.height(x, y) - plate.height(x, y);
-      ASSERT_LT(std::abs(error), 0.8)
-          << name << " at " << x << " " << y;  // beside the upright foot of a bump
-      squares += error * error;
-    }
-    EXPECT_LT(std::sqrt(squares / points), 0.02) << name;
-  }
-}
-
+// What supertac-plate's help states.
 TEST(PlateMesh, RigPlatesComeBackExactlyAtTheNodes) {
   for (const std::string& name : kRigPlates) {
     const Plate plate = Plate::named(name);
-    const Plate again = read(mesh_of(plate), name);
+    const Plate again = read(parse_stl(stl_bytes(mesh_of(plate), name), name), name);
     EXPECT_NEAR(again.texture_begin(), plate.texture_begin(), 0.126) << name;
     EXPECT_NEAR(again.texture_end(), plate.texture_end(), 0.126) << name;
     EXPECT_EQ(again.uniform_in_x(), plate.uniform_in_x()) << name;

@@ -163,12 +163,6 @@ TEST(Windows, OfAnyArray) {
     truth_image(Plate::named("4_Blob"), set.position(i).x_mm, set.position(i).y_mm, {24, 24, 0.5}, expected);
     ASSERT_EQ(truth, expected);
   }
-  std::vector<std::uint32_t> train;
-  for (std::uint32_t i = 0; i < set.size(); i += 9) train.push_back(i);
-  for (const auto& baseline : fit_baselines(set, train)) {
-    baseline.predict(set.raw_window(0), truth);
-    EXPECT_TRUE(std::isfinite(truth[575])) << baseline.name;
-  }
 }
 
 TEST(Windows, RefuseRecordingsOfAnotherArray) {
@@ -204,15 +198,6 @@ TEST(Windows, TruthIsTheTruthImageOfTheLastFrame) {
       }
     }
   }
-}
-
-TEST(Windows, APassShorterThanTheWindowGivesNone) {
-  WindowSet set(wide_settings(64));
-  set.add(make_recording({.frames = 63}));
-  EXPECT_EQ(set.size(), 0U);
-  EXPECT_EQ(set.counts().too_early, 63U);
-  set.add(make_recording({.frames = 64}));
-  EXPECT_EQ(set.size(), 1U);
 }
 
 TEST(Windows, RefuseSettingsOutOfRange) {
