@@ -18,7 +18,7 @@ void declare(Arguments& a) {
   a.positional("WHAT",
                "gradients: all of them against finite differences, in double precision; bits: the hashes "
                "that every processor has to give; machine: processor, disk, ports; udev: prints a rule that "
-               "opens the ports of USB devices; file FILE [OTHER]: checksum, provenance, and whether OTHER "
+               "opens the ports of USB devices; file FILE [OTHER]: checksum, content, and whether OTHER "
                "(recordings or a file) is what it was made from; chain FILE OTHER: whether model and "
                "recordings (--data) are those that the header OTHER of its C code states, and give that code "
                "and picture; training FILE --data DIR: repeats parts of a training that kept a ledger; step "

@@ -15,7 +15,7 @@ int print_udev_rule(const Arguments& a);
 /// int8, on every instruction set that this processor has, against those that every processor has to give.
 int check_bits(const Arguments& a);
 
-/// `supertac-check file`: checksum, content hash and provenance, and whether its data are those given.
+/// `supertac-check file`: checksum and content hash, and whether its data are those given.
 int check_file(const Arguments& a);
 
 /// `supertac-check chain`: the links from recordings to the picture of a microcontroller

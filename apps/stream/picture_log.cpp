@@ -139,12 +139,12 @@ void PictureLog::write(std::map<std::string, std::string> metadata) {
 
 std::string Recorder::finish() {
   stop();
-  std::vector<std::thread> writers;
+  std::future<void> writing;
   {
     const std::lock_guard lock(log_mutex_);
-    writers.swap(writers_);
+    writing = std::move(writing_);
   }
-  for (std::thread& writer : writers) writer.join();
+  if (writing.valid()) writing.wait();
   return status().said;
 }
 
@@ -173,24 +173,23 @@ std::string Recorder::stop() {
 std::string Recorder::close(const std::string& why) {
   const std::lock_guard lock(mutex_);
   const std::string name = std::exchange(status_.recording, "");
-  writers_.emplace_back(&Recorder::complete, this, std::move(log_), name, why);
+  writing_ =
+      std::async(std::launch::async, [this, log = std::move(log_), name, why, before = std::move(writing_)] {
+        if (before.valid()) before.wait();  // one after the other
+        const std::string recorded = "recorded " + name;
+        std::string said = recorded;
+        taken_.clear();
+        try {
+          log->write(metadata_);
+          if (log->empty()) said = "no frame came: nothing was recorded";
+          if (!taken_.empty()) said = taken_;
+        } catch (const std::exception& error) {
+          said = error.what();
+        }
+        const std::lock_guard writing(mutex_);
+        status_.said = said + (why.empty() || said != recorded ? "" : "; " + why);
+      });
   return status_.said = "writing " + name;
-}
-
-void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name, const std::string& why) {
-  const std::lock_guard writing(write_mutex_);  // one after the other
-  const std::string recorded = "recorded " + name;
-  std::string said = recorded;
-  taken_.clear();
-  try {
-    log->write(metadata_);
-    if (log->empty()) said = "no frame came: nothing was recorded";
-    if (!taken_.empty()) said = taken_;
-  } catch (const std::exception& error) {
-    said = error.what();
-  }
-  const std::lock_guard lock(mutex_);
-  status_.said = said + (why.empty() || said != recorded ? "" : "; " + why);
 }
 
 void Recorder::add(const LiveFrame& seen) {

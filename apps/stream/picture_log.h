@@ -4,12 +4,12 @@
 
 #include <atomic>
 #include <cstdio>
+#include <future>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <span>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "apps/stream/live_frame.h"
@@ -103,21 +103,19 @@ class Recorder {
 
  private:
   std::string close(const std::string& why);  // under log_mutex_: a thread writes it; what that says
-  void complete(std::unique_ptr<PictureLog> log, std::string name, const std::string& why);
 
   PictureFormat format_;
   std::map<std::string, std::string> metadata_;
   // Two, so that the stream's thread never waits for one that is asked how things stand, 30 times a second
   // and with no hurry: log_mutex_ is otherwise held for a moment at a start and a stop only.
-  std::mutex log_mutex_;  // of log_, begin_s_ and writers_
+  std::mutex log_mutex_;  // of log_, begin_s_ and writing_
   std::unique_ptr<PictureLog> log_;
   double begin_s_ = -1;
   std::atomic<double> seconds_ = 0;
   std::mutex mutex_;  // of status_
   Status status_;
-  std::vector<std::thread> writers_;  // under log_mutex_; joined by finish()
-  std::mutex write_mutex_;            // of taken_
-  std::string taken_;                 // of what complete() writes: the file got another name, and why
+  std::future<void> writing_;  // of the last one
+  std::string taken_;          // of what is written: the file got another name, and why
 };
 
 }  // namespace supertac

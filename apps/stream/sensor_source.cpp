@@ -17,35 +17,20 @@ namespace {
 
 constexpr char kCaptureHeader[] = R"({"version":1,"kind":"stream"})";
 
-/// A file that keeps every byte of a port; an old one stays until the new one is complete.
-class Capture {
- public:
-  explicit Capture(const std::string& path)
-      : path_(path), writer_(std::filesystem::exists(path) ? path + ".new" : path, kCaptureHeader) {}
-  JournalWriter& writer() { return writer_; }
-  void complete() {
-    writer_.close();
-    if (writer_.path() != path_) publish(writer_.path(), path_);
-  }
-
- private:
-  std::string path_;
-  JournalWriter writer_;
-};
-
 class PortSource : public SensorSource {
  public:
   PortSource(OpenedPort opened, const Sensor& sensor, double speedup = 1,
-             std::unique_ptr<Capture> capture = nullptr)
+             std::unique_ptr<JournalWriter> capture = nullptr, std::string path = "")
       : SensorSource(1 / sensor.rate_hz, 0, opened.live, sensor),
         // A recording of the rig's board is dated by all of its arrivals.
         by_arrival_(sensor.frame.kind == FrameKind::board),
         speedup_(speedup),
         capture_(std::move(capture)),
+        path_(std::move(path)),
         reader_(std::move(opened), sensor) {}
 
   std::optional<SensorFrame> next(double wait_s) override {
-    if (capture_) capture_->writer().check();
+    if (capture_) capture_->check();
     auto frame = reader_.next(wait_s);
     if (!frame) return std::nullopt;
     frame_ = std::move(*frame);
@@ -60,13 +45,16 @@ class PortSource : public SensorSource {
   ReaderCounters counters() override { return reader_.counters(); }
   void finish() override {
     reader_.stop();
-    if (capture_) capture_->complete();
+    if (!capture_) return;
+    capture_->close();
+    if (capture_->path() != path_) publish(capture_->path(), path_);
   }
 
  private:
   bool by_arrival_;
   double speedup_;
-  std::unique_ptr<Capture> capture_;  // outlives the reader, whose port writes to it
+  std::unique_ptr<JournalWriter> capture_;  // outlives the reader, whose port writes to it
+  std::string path_;                        // that it gets when it is complete
   ReadFrame frame_;
   SensorReader reader_;
 };
@@ -109,11 +97,12 @@ class RecordingSource : public SensorSource {
 
 std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup, const std::string& capture) {
   OpenedPort opened = open_port(sensor, speedup);
-  auto kept = capture.empty() ? nullptr : std::make_unique<Capture>(capture);
-  if (kept)
-    opened.port =
-        std::make_unique<CapturedPort>(std::move(opened.port), kept->writer(), JournalStream::board);
-  return std::make_unique<PortSource>(std::move(opened), sensor, speedup, std::move(kept));
+  if (capture.empty()) return std::make_unique<PortSource>(std::move(opened), sensor, speedup);
+  // An old file stays until the new one is complete.
+  auto kept = std::make_unique<JournalWriter>(std::filesystem::exists(capture) ? capture + ".new" : capture,
+                                              kCaptureHeader);
+  opened.port = std::make_unique<CapturedPort>(std::move(opened.port), *kept, JournalStream::board);
+  return std::make_unique<PortSource>(std::move(opened), sensor, speedup, std::move(kept), capture);
 }
 
 std::unique_ptr<SensorSource> open_replay(const std::string& path,

@@ -142,22 +142,6 @@ void open_standard_descriptors() {
   }
 }
 
-int prepare_and_run(Arguments& arguments) {
-  check_threads(arguments.threads());
-  omp_set_num_threads(arguments.threads());
-  catch_signals();
-  check_outputs(arguments);
-  begin_provenance(arguments);
-  if (program_kernels != nullptr && program_kernels().second)
-    std::cerr << program_name + std::string(
-                                    ": this processor has no fused multiply-add: results are the same, but "
-                                    "computing takes many "
-                                    "times longer\n");
-  const int code = run(arguments);
-  if (interrupted()) return 128 + interrupting_signal();
-  return code == kExitOk && arguments.displaced() ? kExitFailed : code;
-}
-
 std::string version_text() {
   std::string text = std::string(program_name) + " " + version() + "\ncommit    " + commit() +
                      "\ncompiler  " + kCompiler + __VERSION__ + "\n";
@@ -171,14 +155,24 @@ int parse_and_run(int argc, const char* const* argv) {
   Arguments arguments(program_name, program_purpose);
   declare(arguments);
   arguments.parse(argc, argv);
-  if (arguments.given("help")) {
-    std::cout << arguments.help();
-  } else if (arguments.given("version")) {
-    std::cout << version_text();
-  } else {
-    return prepare_and_run(arguments);
+  const bool help = arguments.given("help");
+  if (help || arguments.given("version")) {
+    std::cout << (help ? arguments.help() : version_text());
+    return kExitOk;
   }
-  return kExitOk;
+  check_threads(arguments.threads());
+  omp_set_num_threads(arguments.threads());
+  catch_signals();
+  check_outputs(arguments);
+  begin_provenance(arguments);
+  if (program_kernels != nullptr && program_kernels().second)
+    std::cerr << program_name + std::string(
+                                    ": this processor has no fused multiply-add: results are the same, but "
+                                    "computing takes many "
+                                    "times longer\n");
+  const int code = run(arguments);
+  if (interrupted()) return 128 + interrupting_signal();
+  return code == kExitOk && arguments.displaced() ? kExitFailed : code;
 }
 
 int catch_all(int argc, const char* const* argv) {
