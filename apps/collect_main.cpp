@@ -139,8 +139,7 @@ RecorderSettings read_settings(const Arguments& arguments, const std::string& ou
   if (!bed_given || arguments.given("passes"))
     plan.passes = static_cast<int>(arguments.integer("passes", 1, bed_given ? kMostPasses : rig::kPasses));
   settings.home = arguments.flag("home");
-  if (!settings.home)
-    (void)legs_of(plan, bed.origin, bed.limits);  // nothing is opened for one that leaves them
+  (void)planned_s(settings.bed);  // nothing is opened for a plan that leaves the limits
   const int trial = trial_of(arguments);
   settings.header = collection_header(plate, trial, plan.speed, settings.sensor, bed);
   settings.journal = journal_path(out, plate, trial, plan.speed);
@@ -235,12 +234,11 @@ RecorderReport collect(const Arguments& arguments, std::unique_ptr<Port> board, 
   const std::unique_ptr<CollectView> page = web_view(arguments, settings.bed);
   confirm(arguments, settings);
   settings.stop = interrupted;
-  const std::vector<Leg> legs = legs_of(settings.bed.plan, settings.bed.origin);
-  const double all_s = seconds_left(legs, legs.front(), legs.front().from);
+  const double all_s = planned_s(settings.bed);
   Progress progress(arguments, "collecting", static_cast<std::uint64_t>(all_s), "s");
   const double speedup = arguments.number("speedup", 0.1, 100);
   settings.progress = [&](const Leg& leg, const Point3& at, const ReaderCounters& counters) {
-    const double left_s = seconds_left(legs, leg, at);
+    const double left_s = seconds_left(leg, at);
     progress.update(static_cast<std::uint64_t>(std::max(0.0, all_s - left_s)), live_text(at, counters),
                     left_s / speedup);
     if (page) page->update(leg, at, counters);
@@ -287,11 +285,8 @@ PassesReport keep_passes(const Arguments& arguments, const std::string& journal,
   } catch (const std::exception& ended) {
     why = ended.what() + std::string("; ");
   }
-  std::error_code gone;
   throw std::runtime_error(why + error.what() + "; the journal " + journal +
-                           (fs::exists(journal, gone)
-                                ? " is kept, make recordings of it with supertac-import --journal"
-                                : " is gone: somebody removed it during the run"));
+                           " is kept, make recordings of it with supertac-import --journal");
 }
 
 }  // namespace

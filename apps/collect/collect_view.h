@@ -28,7 +28,7 @@ class CollectView {
   CollectView(const WebAddress& address, const Plate& plate, const Bed& bed, double speedup,
               const std::string& source)
       : bed_(bed),
-        legs_(legs_of(bed.plan, bed.origin)),
+        all_s_(planned_s(bed)),
         speedup_(speedup),
         server_(address, {.page = collect_page(),
                           .hello = [hello = hello_of(plate, bed, source)] { return hello; },
@@ -87,14 +87,14 @@ class CollectView {
     }
     if (!state) return {};
     const auto& [leg, at, board] = *state;
-    const double left_s = seconds_left(legs_, leg, at);
+    const double left_s = seconds_left(leg, at);
     return dumped({{"pass", leg.pass},
                    {"phase", name_of(leg.phase)},
                    {"x", at.x - bed_.limits.plate.x},
                    {"y", at.y - bed_.limits.plate.y},
                    {"lifted", at.z > bed_.plan.start.z + 0.1},
                    {"left_s", left_s / speedup_},
-                   {"done", 1 - left_s / seconds_left(legs_, legs_.front(), legs_.front().from)},
+                   {"done", 1 - left_s / all_s_},
                    {"frames", board.decoder.frames},
                    {"rate", board.period_s > 0 ? 1 / board.period_s : 0},
                    {"lost", board.missing},
@@ -102,8 +102,7 @@ class CollectView {
   }
 
   Bed bed_;
-  std::vector<Leg> legs_;
-  double speedup_;
+  double all_s_, speedup_;
   std::mutex mutex_;
   std::optional<State> newest_;
   WebServer server_;  // last: its thread uses the others

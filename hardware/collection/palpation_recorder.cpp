@@ -6,13 +6,6 @@
 namespace supertac {
 namespace {
 
-// Of a run whose printer says that it is busy for ever.
-double longest_run_s(const RecorderSettings& settings) {
-  double planned = 0;
-  for (const Leg& leg : legs_of(settings.bed.plan, settings.bed.origin)) planned += ordered_s(leg);
-  return 3 * planned + 300;
-}
-
 void check_stop(const RecorderSettings& settings, JournalWriter& journal) {
   if (settings.stop()) throw OperatorStop("stopped by the operator");
   journal.check();
@@ -48,7 +41,8 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
   CapturedPort captured(std::move(printer_port), journal, JournalStream::printer);
   Printer printer(captured, settings.bed.limits);
   printer.link().set_watch([&] { check_stop(settings, journal); });
-  printer.link().give_up_at(captured.now() + longest_run_s(settings));
+  // Of a run whose printer says for ever that it is busy.
+  printer.link().give_up_at(captured.now() + 3 * planned_s(settings.bed) + 300);
   RecorderReport report;
   try {
     printer.connect();
@@ -62,7 +56,6 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
     printer.put_back();
     throw;
   }
-  report.printer = printer.link().counters();
   if (report.outcome.complete) journal.event(captured.now(), kRunComplete);
   try {
     journal.close();

@@ -30,7 +30,6 @@ struct RecorderSettings {
 
 struct RecorderReport {
   PalpationOutcome outcome;
-  MarlinLink::Counters printer;
   std::string kept;  ///< of the printer's state, as this run has set it
 };
 

@@ -11,12 +11,11 @@
 namespace supertac {
 namespace {
 
-enum class Dialect { marlin, klipper };
-using enum Dialect;
+constexpr bool marlin = false, klipper = true;
 
 struct StateRule {
   const char* state;  // its name, for people
-  Dialect dialect;
+  bool of_klipper;
   const char* set;     // the command that gives the wanted value; empty: only the owner can
   const char* read;    // the one whose answer tells it; empty: none does
   const char* label;   // what stands before the value in that answer
@@ -56,8 +55,6 @@ constexpr StateRule kRules[] = {
      "set it to 0 (M206 X0 Y0 Z0), or confirm the origin instead of homing", true},
 };
 
-Dialect dialect_of(const MarlinCapabilities& firmware) { return firmware.klipper ? klipper : marlin; }
-
 /// Nothing where the firmware does not know the command.
 std::optional<MarlinLink::Answer> run(MarlinLink& link, const std::string& command, double deadline_s = 0) {
   try {
@@ -76,25 +73,21 @@ bool set_by(MarlinLink& link, const std::string& command, double deadline_s = 0)
   return answer.has_value();
 }
 
-std::optional<std::string> value_in(const MarlinLink::Answer& answer, std::string_view label) {
-  for (const Reply& reply : answer.replies) {
-    const std::size_t at = reply.text.find(label);
-    if (at == std::string::npos) continue;
-    const std::string_view rest = std::string_view(reply.text).substr(at + label.size());
-    return std::string(trimmed(rest.substr(0, rest.find_first_of(";%"))));
-  }
-  return std::nullopt;
-}
-
 bool is_wanted(const std::string& value, const StateRule& rule) {
   return std::ranges::equal(value, std::string_view(rule.wanted), {}, lower, lower);
 }
 
 /// The value as three answers in a row have it: a damaged one must be neither believed nor given back.
 std::optional<std::string> value_by(MarlinLink& link, const StateRule& rule) {
-  const auto value = [&] {
-    const auto answer = run(link, rule.read);
-    return answer ? value_in(*answer, rule.label) : std::nullopt;
+  const std::string_view label = rule.label;
+  const auto value = [&]() -> std::optional<std::string> {
+    for (const Reply& reply : run(link, rule.read).value_or(MarlinLink::Answer()).replies) {
+      const std::size_t at = reply.text.find(label);
+      if (at == std::string::npos) continue;
+      const std::string_view rest = std::string_view(reply.text).substr(at + label.size());
+      return std::string(trimmed(rest.substr(0, rest.find_first_of(";%"))));
+    }
+    return std::nullopt;
   };
   std::optional<std::string> before = value();
   for (int i = 0, same = 1; i < kAttempts && same < 3; ++i)
@@ -105,9 +98,8 @@ std::optional<std::string> value_by(MarlinLink& link, const StateRule& rule) {
 }  // namespace
 
 void MachineState::set(MarlinLink& link, bool homed) {
-  const Dialect dialect = dialect_of(link.capabilities());
   for (const StateRule& rule : kRules) {
-    if (rule.dialect != dialect || (rule.homed && !homed)) continue;
+    if (rule.of_klipper != link.capabilities().klipper || (rule.homed && !homed)) continue;
     const std::string set = rule.set, read = rule.read, wanted = rule.wanted;
     const std::string name = rule.state + (" (" + set + ")");
     const auto known = std::ranges::find(changed_, name, &Changed::name);
@@ -143,7 +135,7 @@ void MachineState::put_back(MarlinLink& link) {
 std::string MachineState::kept() const { return joined(changed_, ", ", &Changed::name); }
 
 std::optional<SoftLimits> soft_limits_of(MarlinLink& link) {
-  if (dialect_of(link.capabilities()) != marlin) return std::nullopt;
+  if (link.capabilities().klipper) return std::nullopt;
   for (const Reply& reply : run(link, "M211").value_or(MarlinLink::Answer()).replies) {
     std::string text = reply.text;
     std::ranges::transform(text, text.begin(), lower);

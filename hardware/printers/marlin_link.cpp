@@ -213,7 +213,7 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
     case ReplyKind::error:
       exchange.error = reply.text;
       // Klipper complains of what it has read right, once.
-      (capabilities_.quick_stop() ? exchange.fault : exchange.error_stands) = true;
+      (capabilities_.klipper ? exchange.error_stands : exchange.fault) = true;
       break;
     case ReplyKind::wait:
     case ReplyKind::temperature:

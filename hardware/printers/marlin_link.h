@@ -26,8 +26,6 @@ struct MarlinCapabilities {
   std::string firmware;           ///< its name and version, the text behind FIRMWARE_NAME
   bool emergency_parser = false;  ///< M112 and M410 act as soon as they arrive, ahead of the queue
   bool klipper = false;           ///< Klipper's host: it asks for no line again, has no M410 and no M114 R
-  /// Whether M410 ends a move that has begun.
-  bool quick_stop() const { return !klipper; }
 };
 
 /// One firmware at one port: sends it commands one at a time, and knows which of them have run. For one

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <utility>
 
 #include "hardware/ports/serial_port.h"
@@ -88,21 +89,11 @@ bool reachable(double speed, const PositionSample& from, const PositionSample& t
 
 double ordered_s(const Leg& leg) { return distance(leg.from, leg.to) / leg.speed; }
 
-double seconds_left(const std::vector<Leg>& legs, const Leg& now, const Point3& at) {
-  const auto here = std::ranges::find_if(legs, [&](const Leg& leg) {
-    return leg.pass == now.pass && leg.phase == now.phase && leg.to == now.to;
-  });
-  // Moves that are none of the plan's are made before the first contact, or behind the last.
-  const auto onset = [](const Leg& leg) { return leg.phase == Phase::onset; };
-  auto next = here != legs.end()             ? here + 1
-              : now.phase == Phase::approach ? std::ranges::find_if(legs, onset)
-                                             : legs.end();
-  double seconds = distance(at, now.to) / now.speed;
-  for (; next != legs.end(); ++next) seconds += ordered_s(*next);
-  return seconds;
+double seconds_left(const Leg& now, const Point3& at) {
+  return distance(at, now.to) / now.speed + now.behind_s;
 }
 
-std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
+std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Limits& limits) {
   const auto usable = [](double value) { return value > 0 && std::isfinite(value); };
   if (plan.passes < 1 || plan.passes > 1000 || !usable(plan.slide) || !usable(plan.lift) ||
       !usable(plan.speed)) {
@@ -130,13 +121,16 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
   add(plan.passes, Phase::reposition, {at.x, at.y, std::max(here.z, high)}, rig::kLiftMmS);
   add(plan.passes, Phase::reposition, {here.x, here.y, at.z}, rig::kFastestMmS);
   std::erase_if(legs, [](const Leg& leg) { return leg.from == leg.to; });
+  double behind_s = 0;
+  for (Leg& leg : legs | std::views::reverse)
+    leg.behind_s = std::exchange(behind_s, behind_s + ordered_s(leg));
+  for (const Leg& leg : legs) limits.check_path(leg.from, leg.to);
   return legs;
 }
 
-std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Limits& limits) {
-  std::vector<Leg> legs = legs_of(plan, here);
-  for (const Leg& leg : legs) limits.check_path(leg.from, leg.to);
-  return legs;
+double planned_s(const Bed& bed) {
+  const Leg first = legs_of(bed.plan, bed.origin, bed.limits).front();
+  return seconds_left(first, first.from);
 }
 
 PalpationOutcome run_palpation(Printer& printer, const PalpationPlan& plan,
@@ -168,7 +162,6 @@ PalpationOutcome Palpation::run() {
     outcome.error = std::current_exception();
   }
   printer_.link().set_watch(nullptr);
-  outcome.realtime_position = realtime_;
   if (!outcome.complete) recover(outcome);
   if (in_contact_) touch(false);
   return outcome;
@@ -191,7 +184,8 @@ void Palpation::measure_start(const Leg& onset) {
       const double way = std::max(0.2 * speed, speed * speed / 250) + 0.5 + 0.035 * pair * speed;
       const Point3 there{here.x, here.y + way, here.z};
       for (const auto& [from, to] : {std::pair{here, there}, {there, here}}) {
-        Leg leg{onset.pass, Phase::approach, from, to, speed};
+        Leg leg{.pass = onset.pass, .from = from, .to = to, .speed = speed};
+        leg.behind_s = ordered_s(onset) + onset.behind_s;
         run_leg(leg);
       }
     }

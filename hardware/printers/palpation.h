@@ -55,12 +55,13 @@ struct Leg {
   double accepted_s = 0;  ///< the firmware's ok to the move
   double ended_s = 0;     ///< the firmware's ok to M400
   double sent_s = 0;      ///< before the move was sent: until then the head stood at `from`
+  double behind_s = 0;    ///< ordered for the legs of the plan behind this one
 };
 
 /// The leg's length over its speed (s).
 double ordered_s(const Leg& leg);
-/// The same for all that is left of a plan's legs, with the head at `at` in the leg `now`.
-double seconds_left(const std::vector<Leg>& legs, const Leg& now, const Point3& at);
+/// The same for all that is left of a plan, with the head at `at` in the leg `now`.
+double seconds_left(const Leg& now, const Point3& at);
 
 /// Whether the head can have come from the one sample to the other at this speed (mm/s); how long the answers
 /// took and their rounding allowed for, and 5 % for the printer's clock.
@@ -82,17 +83,17 @@ struct PalpationOutcome {
   enum class Finger { lifted, stopped, unknown };
   int passes_done = 0;
   bool complete = false;
-  bool realtime_position = true;  ///< the firmware reports where the head is (M114 R)
   Finger finger = Finger::lifted;
   std::string note;          ///< how it ended, when not complete
   std::exception_ptr error;  ///< why, when not complete
 };
 
 /// All legs of the plan, from `here` and back (at lifting height or above). Palpation adds some short ones in
-/// the air where a firmware has no M114 R. Throws std::invalid_argument for a plan that makes no sense.
-std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
-/// The same; throws OutsideLimits where a target or the way to it is not allowed.
+/// the air where a firmware has no M114 R. Throws std::invalid_argument for a plan that makes no sense,
+/// OutsideLimits where a target or the way to it is not allowed.
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Limits& limits);
+/// How long a bed's plan takes as ordered (s).
+double planned_s(const Bed& bed);
 
 /// One run of a plan with a printer whose origin is known. Throws OutsideLimits or std::invalid_argument
 /// before anything moves; after that every failure is in the outcome.

@@ -110,12 +110,8 @@ std::string Printer::put_back() {
 void Printer::check_soft_limits(const std::vector<Point3>& targets) {
   if (origin_ != Origin::homed) return;
   const std::optional<SoftLimits> soft = soft_limits_of(link_);
-  const auto inside = [](double v, double low, double high) {
-    return v > low - kToleranceMm && v < high + kToleranceMm;
-  };
   for (const Point3& p : targets)
-    if (soft && !(inside(p.x, soft->low.x, soft->high.x) && inside(p.y, soft->low.y, soft->high.y) &&
-                  inside(p.z, soft->low.z, soft->high.z)))
+    if (soft && distance(p, soft->cut(p)) > kToleranceMm)
       throw OutsideLimits("printer " + link_.port().name() +
                           ": its soft endstops (M211) would cut the way to " + describe(p) + "; it says " +
                           in_quotes(soft->text) + ", correct the plan or the firmware's limits");
@@ -254,27 +250,24 @@ Point3 Printer::agreed_position(double deadline_s) {
 bool Printer::stands_still() {
   Point3 before;
   int same = 0;
-  const double until = link_.port().now() + kStopDeadline;
-  while (link_.port().now() < until) {
+  for (const double until = link_.port().now() + kStopDeadline; same < 3 && link_.port().now() < until;) {
+    if (same > 0) link_.idle(0.1);
     // M410 holds Marlin for a second, in which it answers nothing.
     const auto sample = sample_position(kStopDeadline);
     if (!sample) continue;
     same = same > 0 && distance(before, sample->position) < 0.005 ? same + 1 : 1;
     before = sample->position;
-    if (same >= 3) break;
-    link_.idle(0.1);
   }
   return same >= 3;
 }
 
 Printer::Stop Printer::quick_stop() {
-  const bool ends_its_move = !link_.capabilities().quick_stop();
+  const auto& [name, parser, klipper] = link_.capabilities();
   Stop stop;
-  const bool parser = link_.capabilities().emergency_parser;
   try {
-    if (!ends_its_move) link_.emergency("M410");
+    if (!klipper) link_.emergency("M410");
     link_.settle();
-    const bool stands = ends_its_move || stands_still();
+    const bool stands = klipper || stands_still();
     // The position of the queue is that of the head only once nothing moves any more.
     link_.command("M400", parser ? kStopDeadline : longest_s());
     target_ = agreed_position();
@@ -289,7 +282,7 @@ Printer::Stop Printer::quick_stop() {
   }
   stop.text = stop.confirmed ? "the head stands still"
                              : "the head could not be shown to stand still; switch the printer off";
-  if (!parser && !ends_its_move)
+  if (!parser && !klipper)
     stop.text +=
         " (this firmware has no emergency parser: a stop acts when its line is read, not before an M400 "
         "ends)";
@@ -324,7 +317,7 @@ void Printer::raise(const Point3& from, double z) {
 }
 
 void Printer::lift_out(double z) {
-  const bool stops = link_.capabilities().quick_stop();
+  const bool stops = !link_.capabilities().klipper;
   stops ? link_.stop() : link_.abandon(longest_s());
   raise(stops ? Point3{target_.x, target_.y, limits_.low.z} : agreed_position(), std::min(z, limits_.high.z));
   link_.command("M400", longest_s());

@@ -1,6 +1,7 @@
 // A Marlin printer that carries the finger: absolute moves within limits, verified positions, stops.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,10 @@ struct Limits {
 struct SoftLimits {
   Point3 low, high;
   std::string text;  ///< as it said them
+
+  Point3 cut(const Point3& p) const {
+    return {std::clamp(p.x, low.x, high.x), std::clamp(p.y, low.y, high.y), std::clamp(p.z, low.z, high.z)};
+  }
 };
 /// M211; nothing where they are off or not told.
 std::optional<SoftLimits> soft_limits_of(MarlinLink& link);

@@ -17,37 +17,20 @@ namespace {
 constexpr double kWorldBegin = 1000;
 constexpr double kLongestRun = 3600;
 
-std::vector<std::string> planned_moves(const PalpationPlan& plan, const Point3& origin) {
-  std::vector<std::string> moves;
-  for (const Leg& leg : legs_of(plan, origin)) moves.push_back(move_command(leg.to, leg.speed));
-  return moves;
-}
-
-// Numbered moves run once and in order; after a fault one lift (G1 Z...) may follow. Two faults can cancel in
-// the XOR: such a move is noted, and what came of it is judged by where the head is.
-std::string check_moves(std::vector<std::string> ran, std::vector<std::string> planned,
-                        const std::vector<std::string>& measured, FaultVerdict& verdict) {
-  // Palpation measures short moves in the air until it knows that the firmware has M114 R.
-  for (auto* moves : {&ran, &planned})
-    for (const std::string& end : measured)
-      std::erase_if(*moves, [&](const std::string& move) { return move.ends_with(end); });
-  const auto unknown = std::ranges::find_if(
-      ran, [&](const std::string& move) { return std::ranges::find(planned, move) == planned.end(); });
-  if (ran.size() > planned.size() && unknown != ran.end()) {  // a measured one
-    verdict.altered = *unknown;
-    ran.erase(unknown);
-  }
-  std::size_t count = ran.size();
-  while (!verdict.complete && count > 0 && ran[count - 1].starts_with("G1 Z")) --count;
-  if (count > planned.size() || (verdict.complete && count != planned.size())) {
-    return "ran " + std::to_string(count) + " moves, planned " + std::to_string(planned.size());
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    if (ran[i] == planned[i]) continue;
-    if (i > 0 && ran[i] == planned[i - 1]) return "move " + std::to_string(i) + " ran twice: " + ran[i];
-    verdict.altered = ran[i] + ", planned " + planned[i];
-  }
-  return {};
+// Whether a damaged move ran, for two faults can cancel in Marlin's 8-bit XOR: one that is neither planned,
+// nor a lift, nor a short one in the air by which Palpation measures a printer. What came of it nobody can
+// know. That lines run once and in order is MarlinLink's.
+bool altered(const std::vector<std::string>& ran, const std::vector<Leg>& legs, const PalpationPlan& plan) {
+  const std::string high = " Z" + format(plan.start.z + plan.lift, 3) + " F";
+  const auto measured = [&](const std::string& move, double speed) {
+    return move.ends_with(high + format(60 * speed, 1));
+  };
+  return std::ranges::any_of(ran, [&](const std::string& move) {
+    return !move.starts_with("G1 Z") && !measured(move, plan.speed) &&
+           !measured(move, std::min(2.0, plan.speed / 4)) && std::ranges::none_of(legs, [&](const Leg& leg) {
+             return move == move_command(leg.to, leg.speed);
+           });
+  });
 }
 
 // Every frame between the first and the last is received or missing, but for what was lost before the last
@@ -105,6 +88,7 @@ void judge_passes(const Collection& collection, const NumberedBoard& board, cons
   for (const CollectedPass& pass : collection.passes) {
     verdict.doubt += pass.doubt + (pass.complete ? "" : "incomplete");
     verdict.left_out += pass.left_out;
+    verdict.realtime = pass.positions > 0;
     double worst = 0;
     for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
       const double* p = pass.position.data() + 3 * i;
@@ -218,26 +202,19 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
   settings.header = "fault run";
   settings.reader.queue_frames = 16;
   settings.reader.silence_s = 5;
-  const std::vector<std::string> planned = planned_moves(settings.bed.plan, settings.bed.origin);
-  const std::vector<Leg> legs = legs_of(settings.bed.plan, settings.bed.origin);
+  const std::vector<Leg> legs = legs_of(plan, origin, settings.bed.limits);
   try {
     auto port = rig.printer_port();
     if (printer) port = printer(std::move(port));
     const RecorderReport report = record_palpation(rig.board_port(), std::move(port), settings);
     const Point3 head = rig.world().printer().head(rig.now());
     verdict.complete = report.outcome.complete;
-    // One that says it did not run a line gets it again; targets are absolute, so that nothing moves.
-    if (printer) numbered.erase(std::unique(numbered.begin(), numbered.end()), numbered.end());
-    verdict.realtime = report.outcome.realtime_position;
-    verdict.printer = report.printer;
-    const std::string high = " Z" + format(plan.start.z + plan.lift, 3) + " F";
-    // Klipper runs damaged lines as well: what they did is seen by where the head was.
-    if (rig_settings.printer.firmware != Firmware::klipper || rig_settings.faults.byte_rate == 0)
-      verdict.broken = check_moves(
-          numbered, planned,
-          {high + format(60 * plan.speed, 1), high + format(60 * std::min(2.0, plan.speed / 4), 1)}, verdict);
-    if (moves_of(rig.world().printer()).size() > numbered.size())
-      verdict.altered = "a line break behind a line's number: it ran without it, and again";
+    // Klipper runs damaged lines as well: what they did is seen by where the head was. A line break behind a
+    // line's number makes Marlin run it without one, and again.
+    const bool klippers = rig_settings.printer.firmware == Firmware::klipper;
+    const bool damaged =
+        (!(klippers && rig_settings.faults.byte_rate > 0) && altered(numbered, legs, plan)) ||
+        moves_of(rig.world().printer()).size() > numbered.size();
     if (verdict.complete && distance(head, legs.back().to) > 0.05) {
       verdict.broken = "false done: the head is at " + describe(head);
     }
@@ -248,11 +225,10 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
     const Collection collection = collection_of(journal);
     verdict.missing = collection.clock.missing;
     judge_passes(collection, board, plan, verdict);
-    // A damaged move that passed as right goes elsewhere, and nobody can know.
-    if (verdict.altered.empty() && verdict.broken.empty())
+    if (!damaged && verdict.broken.empty())
       verdict.broken = check_box(legs, board, 0.1 + std::abs(rig_settings.printer.left_over.mesh_mm));
     rig.run_for(3);  // a firmware that stands still has taken lines that it will run
-    if (verdict.complete && verdict.altered.empty() && verdict.broken.empty() &&
+    if (verdict.complete && !damaged && verdict.broken.empty() &&
         rig.world().printer().left_over() !=
             put_back(rig_settings, rig.world().printer().left_over(), report.kept))
       verdict.broken = "what was changed in the printer was not put back";

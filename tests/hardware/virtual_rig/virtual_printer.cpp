@@ -15,22 +15,11 @@ constexpr std::size_t kCommandBuffer = 4;  // Marlin's BUFSIZE
 constexpr std::size_t kReceiveLines = 6;   // about 128 bytes
 constexpr double kReplyDelayS = 0.0003;
 
-// Of bugfix-2.0.x, 28 lines.
-std::string marlin_banner() {
-  return "start\nMarlin 2.1.2\n\necho: Last Updated: virtual rig | Author: (none)\necho:Compiled: none\n"
-         "echo: Free Memory: 4096  PlannerBufferBytes: 1152\necho:Hardcoded Default Settings Loaded\n"
-         "echo:; Linear Units:\necho:  G21 ; (mm)\necho:; Temperature Units:\n"
-         "echo:  M149 C ; Units in Celsius\necho:; Filament settings (Disabled):\necho:  M200 S0 D1.75\n"
-         "echo:; Steps per unit:\necho:  M92 X80.00 Y80.00 Z400.00 E500.00\n"
-         "echo:; Max feedrates (units/s):\necho:  M203 X300.00 Y300.00 Z5.00 E25.00\n"
-         "echo:; Max Acceleration (units/s2):\necho:  M201 X3000.00 Y3000.00 Z100.00 E10000.00\n"
-         "echo:; Acceleration (units/s2) (P<print-accel> R<retract-accel> T<travel-accel>):\n"
-         "echo:  M204 P500.00 R3000.00 T500.00\n"
-         "echo:; Advanced (B<min_segment_time_us> S<min_feedrate> T<min_travel_feedrate>):\n"
-         "echo:  M205 B20000.00 S0.00 T0.00 X10.00 Y10.00 Z0.30 E5.00\necho:; Home offset:\n"
-         "echo:  M206 X0.00 Y0.00 Z0.00\necho:; Hotend PID:\necho:  M301 P22.20 I1.08 D114.00\n"
-         "echo:; Material heatup parameters:\n";
-}
+// The beginning of bugfix-2.0.x's 28 lines.
+constexpr const char* kMarlinBanner =
+    "start\nMarlin 2.1.2\n\necho: Last Updated: virtual rig | Author: (none)\necho:Compiled: none\n"
+    "echo: Free Memory: 4096  PlannerBufferBytes: 1152\necho:Hardcoded Default Settings Loaded\n"
+    "echo:; Linear Units:\necho:  G21 ; (mm)\necho:; Home offset:\necho:  M206 X0.00 Y0.00 Z0.00\n";
 
 // The code that Marlin's emergency parser sees in a line: spaces, a line number, an M and its digits. What
 // follows the digits it knows does not matter to it, not even more digits.
@@ -84,7 +73,7 @@ VirtualPrinter::VirtualPrinter(const VirtualPrinterSettings& settings, double t,
 }
 
 void VirtualPrinter::reset(double t) {
-  offset_ = steps_zero_ = motion_.stop(t);
+  offset_ = motion_.stop(t);
   report_every(0, 0);
   waits_for_user_ = false;
   queue_.clear();
@@ -200,7 +189,7 @@ void VirtualPrinter::advance(double t) {
     now_ = std::max(now_, next_event());
     if (booting_) {
       booting_ = false;
-      output_ += klipper() ? "// Klipper state: Ready\n" : marlin_banner();
+      output_ += klipper() ? "// Klipper state: Ready\n" : kMarlinBanner;
     } else if (std::min(position_due_, temperature_due_) <= now_) {
       automatic_report(now_);
     } else if (blocked_ && blocked_until_ <= now_) {

@@ -135,7 +135,6 @@ class VirtualPrinter {
   void finish_block(double t);
   void reply_ok();
   void automatic_report(double t);
-  void pause(const std::string& command, double t);
   void kill(double t, const std::string& why);
   void quick_stop(double t);
   bool random_trouble(double t);
@@ -148,7 +147,6 @@ class VirtualPrinter {
   std::map<std::string, std::pair<LeftOver, Point3>> saved_;  // of Klipper, with its base, by NAME=
   double kept_mesh_mm_ = 0;                                   // of its profile
   double ready_s_ = 0;                                        // of Klipper
-  Point3 steps_zero_;                                         // where Count is 0; G92 does not move it
   std::deque<std::string> received_;                          // whole lines not yet looked at
   std::deque<std::string> queue_;                             // accepted, not yet run
   std::string partial_;

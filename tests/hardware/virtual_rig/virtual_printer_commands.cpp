@@ -15,20 +15,13 @@ namespace {
 
 constexpr double kInch = 25.4;
 
-// The answer of bugfix-2.0.x to M115: its name, and what it can do.
+// Of the answer of bugfix-2.0.x to M115: its name, and what it can do.
 std::string marlin_capabilities(bool emergency_parser) {
   return "FIRMWARE_NAME:Marlin 2.1.2 (virtual rig) SOURCE_CODE_URL:github.com/MarlinFirmware/Marlin "
          "PROTOCOL_VERSION:1.0 MACHINE_TYPE:3D Printer EXTRUDER_COUNT:1 "
-         "UUID:cede2a2f-41a2-4748-9b12-c55c62f367ff\n"
-         "Cap:SERIAL_XON_XOFF:0\nCap:BINARY_FILE_TRANSFER:0\nCap:EEPROM:0\nCap:VOLUMETRIC:1\n"
-         "Cap:AUTOREPORT_POS:1\nCap:AUTOREPORT_TEMP:1\nCap:PROGRESS:0\nCap:PRINT_JOB:1\nCap:AUTOLEVEL:0\n"
-         "Cap:RUNOUT:0\nCap:Z_PROBE:0\nCap:LEVELING_DATA:0\nCap:BUILD_PERCENT:0\nCap:SOFTWARE_POWER:0\n"
-         "Cap:TOGGLE_LIGHTS:0\nCap:CASE_LIGHT_BRIGHTNESS:0\nCap:EMERGENCY_PARSER:" +
-         std::string(emergency_parser ? "1" : "0") +
-         "\nCap:HOST_ACTION_COMMANDS:0\nCap:PROMPT_SUPPORT:0\nCap:SDCARD:0\nCap:REPEAT:0\nCap:SD_WRITE:0\n"
-         "Cap:AUTOREPORT_SD_STATUS:0\nCap:LONG_FILENAME:0\nCap:THERMAL_PROTECTION:1\nCap:MOTION_MODES:0\n"
-         "Cap:ARCS:1\nCap:BABYSTEPPING:0\nCap:CHAMBER_TEMPERATURE:0\nCap:COOLER_TEMPERATURE:0\n"
-         "Cap:MEATPACK:0\n";
+         "UUID:cede2a2f-41a2-4748-9b12-c55c62f367ff\nCap:SERIAL_XON_XOFF:0\nCap:AUTOREPORT_POS:1\n"
+         "Cap:EMERGENCY_PARSER:" +
+         std::string(emergency_parser ? "1" : "0") + "\nCap:HOST_ACTION_COMMANDS:0\nCap:ARCS:1\n";
 }
 
 }  // namespace
@@ -155,12 +148,10 @@ void VirtualPrinter::set_position(const std::string& command) {
 }
 
 void VirtualPrinter::run_m(int code, const std::string& command, double t) {
-  const bool only_marlin =
-      code == 0 || code == 108 || code == 154 || code == 155 || code == 211 || code == 410;
+  const bool only_marlin = code == 108 || code == 154 || code == 155 || code == 211 || code == 410;
   if (klipper() && only_marlin) return unknown(command);
   executed_.push_back(command);
   if (run_state(code, command)) return;
-  if (code == 0) return pause(command, t);
   if (code == 112) return kill(t, "echo:M112 Shutdown\n");
   if (code == 114)
     return report(settings_.realtime_position && command.find('R') != std::string::npos ? motion_.at(t)
@@ -212,7 +203,7 @@ void VirtualPrinter::move(const std::string& command, double t) {
 void VirtualPrinter::home(double t) {
   if (settings_.homing_fails) return kill(t, "echo:Homing Failed\n");
   motion_.home(t);
-  offset_ = steps_zero_ = {};
+  offset_ = {};
   base_ = left_over_.offset;
   const Point3& shift = left_over_.home_offset;
   offset_ = {-shift.x, -shift.y, -shift.z};
@@ -225,14 +216,8 @@ void VirtualPrinter::report(const Point3& physical) {
   const auto text = [digits](double v) { return format(std::abs(v) < 0.005 ? 0.0 : v, digits); };
   const Point3 zero = origin();
   const Point3 p{physical.x - zero.x, physical.y - zero.y, physical.z - zero.z};
-  output_ += "X:" + text(p.x) + " Y:" + text(p.y) + " Z:" + text(p.z) + " E:" + text(0);
-  if (klipper()) {
-    output_ += "\n";
-    return;
-  }
-  output_ += " Count X:" + std::to_string(std::llround(80 * (physical.x - steps_zero_.x))) +
-             " Y:" + std::to_string(std::llround(80 * (physical.y - steps_zero_.y))) +
-             " Z:" + std::to_string(std::llround(400 * (physical.z - steps_zero_.z))) + "\n";
+  output_ += "X:" + text(p.x) + " Y:" + text(p.y) + " Z:" + text(p.z) + " E:" + text(0) +
+             (klipper() ? "\n" : " Count X:0 Y:0 Z:0\n");
 }
 
 void VirtualPrinter::report_every(double position_s, double temperature_s) {
@@ -250,17 +235,6 @@ void VirtualPrinter::automatic_report(double t) {
     output_ += " T:25.00 /0.00 B:25.00 /0.00 @:0 B@:0\n";
     temperature_due_ = t + temperature_every_;
   }
-}
-
-// M0 needs somebody who can answer: here M108 through the emergency parser.
-void VirtualPrinter::pause(const std::string& command, double t) {
-  if (!settings_.emergency_parser) {
-    executed_.pop_back();
-    unknown(command);
-    return;
-  }
-  waits_for_user_ = true;
-  block_until(kNever, t);
 }
 
 void VirtualPrinter::pause_behind_move(double t) {
