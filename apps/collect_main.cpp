@@ -229,8 +229,8 @@ void refuse_taken(const Arguments& arguments, const std::string& out, Recording 
                                  : ", or pass --force to replace it"));
 }
 
-RecorderReport collect(const Arguments& arguments, std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
-                       RecorderSettings settings, const OriginMark& mark) {
+PalpationOutcome collect(const Arguments& arguments, std::unique_ptr<Port> board,
+                         std::unique_ptr<Port> printer, RecorderSettings settings, const OriginMark& mark) {
   const std::unique_ptr<CollectView> page = web_view(arguments, settings.bed);
   confirm(arguments, settings);
   settings.stop = interrupted;
@@ -251,7 +251,7 @@ RecorderReport collect(const Arguments& arguments, std::unique_ptr<Port> board, 
     if (page)
       page->end(complete ? "done: " + passes : "incomplete after " + passes + "; " + report.outcome.note,
                 !complete);
-    return report;
+    return report.outcome;
   } catch (const std::exception& error) {
     if (page) page->end(error.what(), true);
     throw;
@@ -276,17 +276,14 @@ PassesReport keep_passes(const Arguments& arguments, const std::string& journal,
   return report;
 }
 
-/// Where the disk is full, what ended the run would be lost behind what goes wrong with its recordings.
-[[noreturn]] void fail_to_keep(const std::exception& error, const std::string& journal,
-                               const PalpationOutcome& outcome) {
-  std::string why;
+/// What ended a run, to stand before what went wrong behind it.
+std::string cause_of(const PalpationOutcome& outcome) {
   try {
     if (outcome.error) std::rethrow_exception(outcome.error);
   } catch (const std::exception& ended) {
-    why = ended.what() + std::string("; ");
+    return ended.what() + std::string("; ");
   }
-  throw std::runtime_error(why + error.what() + "; the journal " + journal +
-                           " is kept, make recordings of it with supertac-import --journal");
+  return {};
 }
 
 }  // namespace
@@ -308,15 +305,15 @@ int run(Arguments& arguments) {
   named.plate = plate, named.trial = trial_of(arguments), named.speed_mm_s = settings.bed.plan.speed;
   refuse_taken(arguments, out, named, settings.bed.plan.passes);
   keep_plate_file(arguments.text("plate"), out);
-  const PalpationOutcome outcome =
-      collect(arguments, std::move(board), std::move(printer), settings, mark).outcome;
+  const PalpationOutcome outcome = collect(arguments, std::move(board), std::move(printer), settings, mark);
   if (!outcome.complete)
     arguments.note("incomplete after " + std::to_string(outcome.passes_done) + " passes; " + outcome.note);
   PassesReport report;
   try {
     report = keep_passes(arguments, settings.journal, outcome);
   } catch (const std::exception& error) {
-    fail_to_keep(error, settings.journal, outcome);
+    throw std::runtime_error(cause_of(outcome) + error.what() + "; the journal " + settings.journal +
+                             " is kept, make recordings of it with supertac-import --journal");
   }
   if (outcome.complete) {
     const std::string all = std::to_string(outcome.passes_done) + " passes, " + report.total();

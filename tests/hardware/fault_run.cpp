@@ -186,28 +186,22 @@ DrawnRun::DrawnRun(std::uint64_t seed) {
 FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan& plan, const Point3& origin,
                                    const PortBetween& printer) {
   FaultVerdict verdict;
-  const TemporaryFolder folder;
   rig_settings.printer.head = origin;
   NumberedBoard board(rig_settings);
-  SimulatedRig rig(rig_settings);
+  CollectionBench bench(rig_settings, plan, origin);
+  SimulatedRig& rig = bench.rig;
   board.watch(rig.world().board());
   std::vector<std::string> numbered;
   rig.world().printer().on_line([&](std::int64_t, const std::string& command, double) {
     if (command.starts_with("G1 ")) numbered.push_back(command);
   });
-  RecorderSettings settings;
-  settings.bed.plan = plan;
-  settings.bed.origin = origin;
-  settings.journal = folder / "journal";
-  settings.header = "fault run";
-  settings.reader.queue_frames = 16;
-  settings.reader.silence_s = 5;
-  const std::vector<Leg> legs = legs_of(plan, origin, settings.bed.limits);
+  bench.settings.reader.silence_s = 5;
+  const std::vector<Leg> legs = legs_of(plan, origin, bench.settings.bed.limits);
   try {
     auto port = rig.printer_port();
     if (printer) port = printer(std::move(port));
-    const RecorderReport report = record_palpation(rig.board_port(), std::move(port), settings);
-    const Point3 head = rig.world().printer().head(rig.now());
+    const RecorderReport report = record_palpation(rig.board_port(), std::move(port), bench.settings);
+    const Point3 head = bench.head();
     verdict.complete = report.outcome.complete;
     // Klipper runs damaged lines as well: what they did is seen by where the head was. A line break behind a
     // line's number makes Marlin run it without one, and again.
@@ -219,9 +213,9 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
       verdict.broken = "false done: the head is at " + describe(head);
     }
     if (!verdict.complete && verdict.broken.empty()) {
-      verdict.broken = check_finger(report.outcome, rig, head, settings.bed.plan.start.z);
+      verdict.broken = check_finger(report.outcome, rig, head, plan.start.z);
     }
-    const Journal journal = read_journal(settings.journal);
+    const Journal journal = bench.journal();
     const Collection collection = collection_of(journal);
     verdict.missing = collection.clock.missing;
     judge_passes(collection, board, plan, verdict);
@@ -229,8 +223,7 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
       verdict.broken = check_box(legs, board, 0.1 + std::abs(rig_settings.printer.left_over.mesh_mm));
     rig.run_for(3);  // a firmware that stands still has taken lines that it will run
     if (verdict.complete && !damaged && verdict.broken.empty() &&
-        rig.world().printer().left_over() !=
-            put_back(rig_settings, rig.world().printer().left_over(), report.kept))
+        bench.firmware().left_over() != put_back(rig_settings, bench.firmware().left_over(), report.kept))
       verdict.broken = "what was changed in the printer was not put back";
     // Nobody can count frames to one that waited among lost ones.
     const RigFaults& faults = rig_settings.faults;

@@ -145,6 +145,26 @@ struct PrinterBench {
   Printer printer;
 };
 
+/// A collection on a simulated rig, and what it is to do.
+struct CollectionBench {
+  explicit CollectionBench(const RigSettings& rig_settings, const PalpationPlan& plan = {},
+                           const Point3& origin = rig::kMounted)
+      : rig(rig_settings) {
+    settings.bed.plan = plan, settings.bed.origin = origin;
+    settings.journal = folder / "journal";
+    settings.header = "test";
+    settings.reader.queue_frames = 16;  // nobody looks at the live frames here
+  }
+  RecorderReport record() { return record_palpation(rig.board_port(), rig.printer_port(), settings); }
+  Journal journal() const { return read_journal(settings.journal); }
+  VirtualPrinter& firmware() { return rig.world().printer(); }
+  Point3 head() { return firmware().head(rig.now()); }
+
+  TemporaryFolder folder;
+  SimulatedRig rig;
+  RecorderSettings settings;
+};
+
 /// The same, and the head's place is known: rig::kMounted.
 struct ReadyBench : PrinterBench {
   explicit ReadyBench(const RigSettings& settings = running_rig()) : PrinterBench(settings) {
