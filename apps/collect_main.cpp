@@ -17,7 +17,7 @@
 #include "apps/web/web_server.h"
 #include "data/plates/plate.h"
 #include "data/recordings/recording.h"
-#include "hardware/collection/palpation_recorder.h"
+#include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
 #include "hardware/ports/port.h"
 #include "hardware/ports/serial_port.h"

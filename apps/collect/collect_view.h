@@ -15,7 +15,7 @@
 #include "data/plates/plate.h"
 #include "data/plates/truth.h"
 #include "data/sensors/rig.h"
-#include "hardware/collection/palpation_recorder.h"
+#include "hardware/collection/collection.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {

@@ -38,10 +38,9 @@ SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor, const Reader
 void SensorReader::run() {
   double time_s = last_frame_s_;
   try {
-    bool ended = false;
     try {
       do time_s = read(port_->now() + kReadSlice);
-      while (!asked_to_stop());
+      while (!stop_);
       // What had arrived when the stop was asked for still counts. Where the machine is busy more comes with
       // every read: a port holds a tenth of a second at most.
       double now = port_->now();
@@ -52,10 +51,7 @@ void SensorReader::run() {
         time_s = read(now);
       }
     } catch (const PortEnded&) {  // nothing is wrong, but with one that was to go on
-      ended = true;
-    }
-    if (ended) {  // the last line may lack its end
-      const std::byte end{'\n'};
+      const std::byte end{'\n'};  // which the last line may lack
       const bool lines = sensor_.frame.kind == FrameKind::text || sensor_.frame.kind == FrameKind::json;
       decode({&end, lines ? 1U : 0U}, time_s);
       if (live_)
@@ -124,7 +120,7 @@ void SensorReader::take(std::size_t count) {
       taken_.wait(lock, [&] { return queue_.size() < most_ || stop_; });
     } else if (queue_.size() >= most_) {
       queue_.pop_front();
-      ++dropped_;
+      ++read_.dropped;
     }
     queue_.push_back(frame);
     arrived_.notify_one();
@@ -138,11 +134,6 @@ ReaderCounters SensorReader::counted() const {
   counters.period_s = clock_.period_s();
   if (!is_rig(sensor_)) counters.suspect += counters.decoder.torn + counters.damaged;
   return counters;
-}
-
-bool SensorReader::asked_to_stop() {
-  const std::lock_guard lock(mutex_);
-  return stop_;
 }
 
 void SensorReader::stop() {
@@ -223,9 +214,7 @@ void SensorReader::check_clock(double stamp_s, double arrival_s) {
 
 ReaderCounters SensorReader::counters() {
   const std::lock_guard lock(mutex_);
-  ReaderCounters counters = counters_;
-  counters.dropped = dropped_;
-  return counters;
+  return counters_;
 }
 
 std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, double seconds,

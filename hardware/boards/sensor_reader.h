@@ -3,6 +3,7 @@
 // oldest frames; a counter says how many.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -80,7 +81,6 @@ class SensorReader {
   void decode(std::span<const std::byte> bytes, double time_s);
   void take(std::size_t count);
   ReaderCounters counted() const;
-  bool asked_to_stop();
   void check_silence(double time_s);
   void check_clock(double stamp_s, double arrival_s);
 
@@ -105,14 +105,15 @@ class SensorReader {
   std::uint64_t checked_frames_ = 0;
   bool clock_checked_ = false;
 
+  std::atomic<bool> stop_{false};
+
   mutable std::mutex mutex_;  // of all that follows
   std::condition_variable arrived_, taken_;
   std::deque<ReadFrame> queue_;
   std::size_t most_;
-  bool stop_ = false, ended_ = false;
+  bool ended_ = false;
   std::exception_ptr error_;
   ReaderCounters counters_;
-  std::uint64_t dropped_ = 0;
   std::thread thread_;
 };
 

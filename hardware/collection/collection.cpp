@@ -32,15 +32,14 @@ std::vector<double> numbers_of(std::string_view text) {
 }
 
 struct RecordedLeg {
-  Leg leg;
-  bool ended = false;
+  Leg leg;  // that ended where it has a time for that
   std::vector<PositionSample> samples;
 };
 
 // The end names its leg whole: the beginning may be lost with a damaged part of the journal.
 void end_leg(std::vector<RecordedLeg>& legs, const Leg& leg) {
   if (legs.empty() || legs.back().leg.accepted_s != leg.accepted_s) {
-    RecordedLeg found{leg, true, {}};
+    RecordedLeg found{leg, {}};
     if (!legs.empty()) {
       auto& before = legs.back().samples;
       const auto first = std::find_if(before.begin(), before.end(),
@@ -51,7 +50,6 @@ void end_leg(std::vector<RecordedLeg>& legs, const Leg& leg) {
     legs.push_back(std::move(found));
   }
   legs.back().leg.ended_s = leg.ended_s;
-  legs.back().ended = true;
 }
 
 std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
@@ -69,12 +67,12 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
                     {n[6], n[7], n[8]},
                     n[9],
                     n[10],
-                    n[11],
+                    n[0] != 0 ? n[11] : 0,
                     n[12] > 0 ? n[12] : n[10]};
       if (n[0] != 0)
         end_leg(legs, leg);
       else
-        legs.push_back({leg, false, {}});
+        legs.push_back({leg, {}});
     } else if (text.starts_with("at ") && n.size() == 5 && !legs.empty()) {
       legs.back().samples.push_back({n[0], n[1], {n[2], n[3], n[4]}});
     }
@@ -212,18 +210,18 @@ Collection collection_of(const Journal& journal) {
   CollectedFrames all = frames_in(journal, collection.sensor);
   std::vector<Leg> ended;
   for (const RecordedLeg& recorded : legs)
-    if (recorded.ended) ended.push_back(recorded.leg);
+    if (recorded.leg.ended_s > 0) ended.push_back(recorded.leg);
   MoveTiming timing = timing_of(ended);
-  for (const auto& [leg, over, samples] : legs)
+  for (const auto& [leg, samples] : legs)
     if (leg.speed > 0) timing.faster = std::max(timing.faster, fitted_speed(leg, samples) / leg.speed);
   std::map<int, std::pair<CollectedPass, PositionTrack>> passes;
-  for (const auto& [leg, over, samples] : legs) {
+  for (const auto& [leg, samples] : legs) {
     if (leg.phase != Phase::onset && leg.phase != Phase::slide && leg.phase != Phase::release) continue;
     auto& [pass, track] = passes[leg.pass];
     track.add_leg(leg, samples, timing);
     pass.positions += samples.size();
     if (leg.phase == Phase::slide) pass.speed = leg.speed;
-    if (leg.phase == Phase::release) pass.complete = over;
+    if (leg.phase == Phase::release) pass.complete = leg.ended_s > 0;
   }
   for (auto& [number, both] : passes) {
     auto& [pass, track] = both;

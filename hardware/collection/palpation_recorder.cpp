@@ -1,6 +1,6 @@
-#include "hardware/collection/palpation_recorder.h"
-
+// What supertac-collect does, without its output.
 #include "hardware/collection/collection.h"
+
 #include "hardware/ports/errors.h"
 
 namespace supertac {

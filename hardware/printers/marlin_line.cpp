@@ -1,4 +1,4 @@
-#include "hardware/printers/marlin_line.h"
+// The text of Marlin's serial protocol, without any port.
 
 #include <algorithm>
 #include <array>
@@ -7,6 +7,7 @@
 #include <initializer_list>
 #include <stdexcept>
 
+#include "hardware/printers/marlin_link.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 

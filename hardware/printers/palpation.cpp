@@ -8,6 +8,7 @@
 #include "hardware/ports/serial_port.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -140,12 +141,16 @@ PalpationOutcome run_palpation(Printer& printer, const PalpationPlan& plan,
 
 PalpationOutcome Palpation::run() {
   std::vector<Leg> legs = legs_of(plan_, printer_.target(), printer_.limits());
-  std::vector<Point3> targets;
+  std::optional<SoftLimits> soft;
+  if (printer_.origin() == Printer::Origin::homed) soft = soft_limits_of(printer_.link());
   for (const Leg& leg : legs) {
     longest_leg_s_ = std::max(longest_leg_s_, ordered_s(leg));
-    targets.push_back(leg.to);
+    if (soft && soft->cut(leg.to))
+      throw OutsideLimits("printer " + printer_.link().port().name() +
+                          ": its soft endstops (M211) would cut the way to " + describe(leg.to) +
+                          "; it says " + in_quotes(soft->text) +
+                          ", correct the plan or the firmware's limits");
   }
-  printer_.check_soft_limits(targets);
   PalpationOutcome outcome;
   printer_.link().set_watch(observer_.check);
   try {

@@ -89,8 +89,6 @@ std::string move_command(const Point3& target, double speed_mm_s) {
   return "G1" + coordinates(target) + " F" + format(60 * speed_mm_s, 1);
 }
 
-std::string origin_command(const Point3& here) { return "G92" + coordinates(here); }
-
 void Printer::connect() {
   origin_ = Origin::unknown;
   link_.connect();
@@ -105,16 +103,6 @@ std::string Printer::put_back() {
   } catch (const HardwareError&) {  // nobody is there to put it back
   }
   return state_.kept();
-}
-
-void Printer::check_soft_limits(const std::vector<Point3>& targets) {
-  if (origin_ != Origin::homed) return;
-  const std::optional<SoftLimits> soft = soft_limits_of(link_);
-  for (const Point3& p : targets)
-    if (soft && distance(p, soft->cut(p)) > kToleranceMm)
-      throw OutsideLimits("printer " + link_.port().name() +
-                          ": its soft endstops (M211) would cut the way to " + describe(p) + "; it says " +
-                          in_quotes(soft->text) + ", correct the plan or the firmware's limits");
 }
 
 void Printer::home() {
@@ -150,7 +138,7 @@ void Printer::confirm_origin(const Point3& here) {
   if (link_.capabilities().klipper)
     link_.command("SET_KINEMATIC_POSITION X=" + format(here.x, 3) + " Y=" + format(here.y, 3) +
                   " Z=" + format(here.z, 3));
-  link_.command(origin_command(here));
+  link_.command("G92" + coordinates(here));
   target_ = here;
   const Point3 found = agreed_position();
   if (distance(found, here) > kToleranceMm) {

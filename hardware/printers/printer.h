@@ -26,13 +26,17 @@ struct Limits {
   bool operator==(const Limits&) const = default;
 };
 
+constexpr double kToleranceMm = 0.05;  ///< positions so near are the same: answers are rounded
+
 /// Where the firmware itself cuts moves of a homed machine, without a word.
 struct SoftLimits {
   Point3 low, high;
   std::string text;  ///< as it said them
 
-  Point3 cut(const Point3& p) const {
-    return {std::clamp(p.x, low.x, high.x), std::clamp(p.y, low.y, high.y), std::clamp(p.z, low.z, high.z)};
+  bool cut(const Point3& p) const {
+    const Point3 left{std::clamp(p.x, low.x, high.x), std::clamp(p.y, low.y, high.y),
+                      std::clamp(p.z, low.z, high.z)};
+    return distance(p, left) > kToleranceMm;
   }
 };
 /// M211; nothing where they are off or not told.
@@ -64,11 +68,8 @@ class MachineState {
 
 constexpr double kStopWithin = 1.6;  ///< s, of the 2 in which Ctrl-C ends a program; M410 takes one of them
 
-constexpr double kToleranceMm = 0.05;  ///< positions so near are the same: answers are rounded
-
-/// The line that makes a straight move, and the one that says where the head is.
+/// The line that makes a straight move.
 std::string move_command(const Point3& target, double speed_mm_s);
-std::string origin_command(const Point3& here);
 
 // One straight move with acceleration: the trapezoid of speed over time.
 
@@ -107,8 +108,6 @@ class Printer {
   /// What connect() changed becomes as it was found, where that can be; returns what does not. Throws
   /// nothing.
   std::string put_back();
-  /// Throws OutsideLimits where the firmware of a homed machine would cut one of these targets.
-  void check_soft_limits(const std::vector<Point3>& targets);
 
   /// Lifts, homes, and lifts again when the limits say so. Never homes x and y with z low. Whatever ends it
   /// early stops the head.

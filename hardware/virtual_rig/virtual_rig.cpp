@@ -18,7 +18,6 @@
 
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
-#include "hardware/printers/marlin_line.h"
 #include "hardware/printers/printer.h"
 #include "io/numbers/numbers.h"
 

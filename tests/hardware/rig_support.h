@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "data/frames/binary_decoder.h"
-#include "hardware/collection/palpation_recorder.h"
+#include "hardware/collection/collection.h"
 #include "hardware/printers/printer.h"
 #include "io/numbers/random.h"
 #include "tests/hardware/fake_port.h"

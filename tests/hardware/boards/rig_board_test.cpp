@@ -114,22 +114,6 @@ TEST(RigBoard, StoppingDoesNotWaitForAConsumerThatIsGone) {
   EXPECT_TRUE(board.next(0));
 }
 
-TEST(RigBoard, FramesThatWaitedFollowTheOneBefore) {
-  // Four frames that waited for 4 ms; then two right behind one another, closer than a period allows.
-  const double late = 10 + 4.2 * rig::kFramePeriodS;
-  SensorReader board({.port = std::make_unique<ScriptedPort>(std::vector<ScriptedPort::Read>{
-                          {10, some_frames(1)}, {late, some_frames(4)}, {late + 0.001, some_frames(2)}})},
-                     Sensor{});
-  double before = 10 - rig::kFramePeriodS;
-  for (int i = 0; i < 7; ++i) {
-    const auto frame = board.next(kPatience);
-    ASSERT_TRUE(frame);
-    EXPECT_GT(frame->date.time_s, before);
-    EXPECT_LE(frame->date.time_s, frame->arrival.time_s);
-    before = frame->date.time_s;
-  }
-}
-
 TEST(RigBoard, ReplaysACaptureOfLargerReads) {
   const std::vector<std::byte> bytes = some_frames(60);
   SensorReader board(

@@ -3,13 +3,13 @@
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
-#include <pty.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
+#include "hardware/virtual_rig/virtual_rig.h"
 #include "io/files/file.h"
 #include "tests/hardware/fake_sensor.h"
 #include "tests/support/test.h"
@@ -127,23 +127,21 @@ TEST(SensorReader, CountsWhatIsLostLateAndDamaged) {
 // What the reader says of a device that sends milliseconds for two seconds, which its file calls `unit`;
 // those of the first half second are `off_ms` off.
 std::string said_of_clock(const std::string& unit, long off_ms) {
-  int device, other;
-  EXPECT_EQ(openpty(&device, &other, nullptr, nullptr, nullptr), 0);
-  const std::string port = ptsname(device);
+  const TemporaryFolder folder;
+  const PseudoTerminal device(folder / "port");
   std::string said = "nothing";
   try {
-    SensorReader reader(open_port("serial:" + port + "@115200"),
+    SensorReader reader(open_port("serial:" + device.path() + "@115200"),
                         mat(1, 2, 100, R"({"kind":"text","time":{"column":0,"unit":")" + unit + "\"}}"));
     const double begin = monotonic_seconds();
     for (double now = 0; now < 2; now = monotonic_seconds() - begin) {
       const std::string line = std::to_string(std::lround(1000 * now) + (now < 0.5 ? off_ms : 0)) + ",1,2\n";
-      EXPECT_EQ(write(device, line.data(), line.size()), static_cast<ssize_t>(line.size()));
+      EXPECT_EQ(write(device.descriptor(), line.data(), line.size()), static_cast<ssize_t>(line.size()));
       while (reader.next(0.01)) continue;
     }
   } catch (const WrongDevice& error) {
     said = error.what();
   }
-  close(device), close(other);
   return said;
 }
 
@@ -252,17 +250,18 @@ TEST(SensorReader, ASourceThatWasToGoOnMayNotEnd) {
 }
 
 TEST(SensorReader, WhatComesWithoutAFrameIsSaid) {
-  int master = -1, slave = -1;
-  char name[100];
-  ASSERT_EQ(openpty(&master, &slave, name, nullptr, nullptr), 0);
+  const TemporaryFolder folder;
+  const PseudoTerminal device(folder / "port");
   const Sensor sensor = mat(2, 2, 1000, R"({"kind":"text"})");
-  const auto send = [master](const std::string& line) { return write(master, line.data(), line.size()) > 0; };
-  const std::string at = "serial:" + std::string(name) + "@115200";
+  const auto send = [&](const std::string& line) {
+    return write(device.descriptor(), line.data(), line.size()) > 0;
+  };
+  const std::string at = "serial:" + device.path() + "@115200";
   auto reader = std::make_unique<SensorReader>(open_port(at), sensor);
   const std::string busy = "echo:busy: " + std::string(98, 'p') + " for now\n" + std::string(60, 'q');
   ASSERT_TRUE(send(busy));
   EXPECT_ERROR(all_of(*reader), WrongDevice,
-               "sensor sensor at " + std::string(name) +
+               "sensor sensor at " + device.path() +
                    ": expected frames of 4 values, found 178 bytes without "
                    "one, such as '" +
                    busy.substr(0, 117) + "?qq'; supertac-stream --probe says what they are");
@@ -271,7 +270,6 @@ TEST(SensorReader, WhatComesWithoutAFrameIsSaid) {
   ASSERT_TRUE(send("1,2,3,4\n") && reader->next(10) && send("1,2,1,2,1,2"));
   EXPECT_ERROR(all_of(*reader), BoardSilent,
                "found none for 3.0 s in 11 bytes, such as '1,2,1,2,1,2'; see whether it was switched off or");
-  for (const int end : {slave, master}) close(end);
 }
 
 }  // namespace supertac::sensor_reader_test

@@ -3,7 +3,6 @@
 
 #include "data/frames/binary_decoder.h"
 #include "hardware/collection/collection.h"
-#include "hardware/collection/palpation_recorder.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "tests/hardware/fake_sensor.h"

@@ -1,7 +1,4 @@
-#include "hardware/printers/marlin_line.h"
-
-#include <clocale>
-
+#include "hardware/printers/marlin_link.h"
 #include "tests/hardware/virtual_rig/virtual_printer.h"
 #include "tests/support/test.h"
 

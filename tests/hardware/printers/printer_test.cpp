@@ -23,15 +23,11 @@ TEST(Limits, NameTheAxisAndCheckTheWay) {
                "the way from X50.00 Y101.17 Z96.00 to X99.70 Y101.17 Z91.81 passes");
 }
 
-TEST(Printer, NothingMovesWithoutAnOrigin) {
+TEST(Printer, WithoutAnOriginOrOutsideTheLimitsNothingIsSent) {
   PrinterBench bench;
   EXPECT_ERROR(bench.printer.start_move({100, 110, 120}, 10), OriginUnknown,
                "the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
-  EXPECT_TRUE(moves_of(bench.firmware()).empty());
-}
-
-TEST(Printer, OutsideTheLimitsNothingIsSent) {
-  ReadyBench bench;
+  bench.printer.confirm_origin(kMounted);
   EXPECT_ERROR(bench.printer.start_move({500, 101.17, 131.81}, 10), OutsideLimits, "X expected");
   EXPECT_TRUE(moves_of(bench.firmware()).empty());
   EXPECT_EQ(bench.head(), kMounted);
@@ -108,39 +104,25 @@ TEST(Printer, MarlinsSilentClampIsFound) {
                "and start again");
 }
 
-// Also where M410 holds the firmware for a second, in which it answers nothing.
+// Also where M410 holds the firmware for a second, in which it answers nothing; and while M400 is waited for.
 TEST(Printer, QuickStopActsAheadOfTheQueue) {
-  for (const bool parser : {true, false}) {
+  for (const auto& [parser, in_m400] : {std::pair(true, false), {false, false}, {true, true}}) {
     ReadyBench bench(running_rig({.emergency_parser = parser}));
     bench.printer.start_move({99.7, 201.17, 131.81}, 10);
-    bench.printer.link().idle(2);
-    const double before = bench.rig.now();
+    const double stop_at = bench.rig.now() + 2;
+    bench.printer.link().set_watch([&] {
+      if (bench.rig.now() > stop_at) throw OperatorStop("asked to stop");
+    });
+    EXPECT_THROW(in_m400 ? (void)bench.printer.finish_move() : bench.printer.link().idle(3), OperatorStop);
+    bench.printer.link().set_watch(nullptr);
     const Printer::Stop stop = bench.printer.quick_stop();
     EXPECT_TRUE(stop.confirmed) << stop.text;
-    EXPECT_EQ(stop.text.find("behind the queue"), std::string::npos) << stop.text;
+    EXPECT_EQ(stop.text.find("no emergency parser") != std::string::npos, !parser) << stop.text;
     EXPECT_EQ(bench.printer.link().counters().timeouts, 0U);
-    EXPECT_LT(bench.rig.now() - before, 3);
+    EXPECT_LT(bench.rig.now() - stop_at, 3);
     EXPECT_LT(bench.head().y, 125);
     EXPECT_LT(distance(bench.printer.target(), bench.head()), 0.01);
   }
-}
-
-TEST(Printer, StopsDuringM400) {
-  ReadyBench bench;
-  bench.printer.start_move({99.7, 201.17, 131.81}, 10);
-  const double stop_at = bench.rig.now() + 3;
-  bench.printer.link().set_watch([&] {
-    if (bench.rig.now() > stop_at) throw OperatorStop("asked to stop");
-  });
-  EXPECT_THROW(bench.printer.finish_move(), OperatorStop);
-  bench.printer.link().set_watch(nullptr);
-  EXPECT_TRUE(bench.printer.quick_stop().confirmed);
-  EXPECT_LT(bench.head().y, 140);
-}
-
-TEST(Printer, SaysSoWithoutEmergencyParser) {
-  PrinterBench bench(running_rig({.emergency_parser = false}));
-  EXPECT_NE(bench.printer.quick_stop().text.find("no emergency parser"), std::string::npos);
 }
 
 TEST(Printer, ADamagedPositionNeverLowersTheFinger) {
@@ -210,12 +192,6 @@ TEST(RealMarlin, TheLineBeforeAHaltIsInTheError) {
   EXPECT_ERROR(hot.printer.queue_position(), PrinterHalted, "Heater_ID: E0");
 }
 
-TEST(RealMarlin, ACommandThatTheFirmwareDoesNotKnowIsSentOnce) {
-  PrinterBench bench;
-  EXPECT_ERROR(bench.printer.link().command("M999"), PrinterRefused, "echo:Unknown command: \"M0999\"");
-  EXPECT_EQ(bench.printer.link().counters().repeats, 0U);
-}
-
 TEST(RealMarlin, AdvancedOkAndTemperatureBehindTheOkAreUnderstood) {
   ReadyBench bench(running_rig({.advanced_ok = true}));
   for (const char* code : {"G21", "M105", "M155 S0"}) bench.printer.link().command(code);
@@ -238,10 +214,12 @@ TEST(Klipper, IsSentNoLineAgain) {
   EXPECT_EQ(moves, sent);
 }
 
-TEST(Klipper, WhatItSaysReachesTheUser) {
-  PrinterBench bench(klipper_rig());
+TEST(Klipper, WhatItRefusesIsSentOnceAndSaid) {
+  PrinterBench marlin, bench(klipper_rig());
+  EXPECT_ERROR(marlin.printer.link().command("M999"), PrinterRefused, "echo:Unknown command: \"M0999\"");
   EXPECT_ERROR(bench.printer.link().command("G1 X10"), PrinterRefused, "!! Must home axis first");
   EXPECT_ERROR(bench.printer.link().command("M410"), PrinterRefused, "// Unknown command:\"M410\"");
+  for (PrinterBench* printer : {&marlin, &bench}) EXPECT_EQ(printer->printer.link().counters().repeats, 0U);
   EXPECT_TRUE(bench.printer.emergency_stop().confirmed);
 }
 

@@ -1,6 +1,6 @@
 #include "data/sensors/rig.h"
 
-#include "hardware/printers/marlin_line.h"
+#include "hardware/printers/marlin_link.h"
 #include "hardware/virtual_rig/virtual_rig.h"
 #include "tests/support/test.h"
 

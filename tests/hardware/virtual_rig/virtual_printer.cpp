@@ -6,7 +6,7 @@
 #include <numbers>
 #include <utility>
 
-#include "hardware/printers/marlin_line.h"
+#include "hardware/printers/marlin_link.h"
 
 namespace supertac {
 namespace {
