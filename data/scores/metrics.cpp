@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -186,9 +187,9 @@ double MetricsAccumulator::floor() const {
   const std::size_t count = sampled_truths_.size() / pixels;
   if (count < 2) return Metrics::kNone;
   std::vector<std::size_t> partner(count);
-  for (std::size_t i = 0; i < count; ++i) partner[i] = i;
-  const RandomStream random(stream_named("floor"),
-                            1);  // Sattolo's shuffle: one cycle, so nobody meets himself
+  std::iota(partner.begin(), partner.end(), std::size_t{0});
+  // Sattolo's shuffle: one cycle, so nobody meets himself.
+  const RandomStream random(stream_named("floor"), 1);
   for (std::size_t i = count - 1; i > 0; --i)
     std::swap(partner[i], partner[static_cast<std::size_t>(random.uniform(i) * static_cast<double>(i))]);
   PhaseCorrelator correlator(grid_.height, grid_.width);
@@ -225,13 +226,7 @@ Metrics MetricsAccumulator::result() const {
 }
 
 ZoneMetrics::ZoneMetrics(const ImageGrid& grid)
-    : grid_(grid),
-      correlator_(grid.height, grid.width),
-      all_(grid),
-      contact_(grid),
-      flat_(grid),
-      air_(grid),
-      edge_(grid) {}
+    : grid_(grid), correlator_(grid.height, grid.width), parts_(kParts, MetricsAccumulator(grid)) {}
 
 bool ZoneMetrics::on_edge(std::span<const float> truth, float level) const {
   const auto height = static_cast<std::size_t>(grid_.height), width = static_cast<std::size_t>(grid_.width);
@@ -246,21 +241,19 @@ void ZoneMetrics::add(std::span<const float> output, std::span<const float> trut
                       std::optional<float> contact_level) {
   const ImageScores scores = scores_of(output, truth);
   const float silent = contact_level.value_or(0);
-  all_.add(output, truth, scores, silent);
-  if (zone == Zone::contact) contact_.add(output, truth, scores, silent);
-  if (zone == Zone::flat) flat_.add(output, truth, scores, silent);
-  if (zone == Zone::air) air_.add(output, truth, scores, silent);
-  if (zone == Zone::contact && contact_level && on_edge(truth, silent))
-    edge_.add(output, truth, scores, silent);
+  const bool contact = zone == Zone::contact;
+  const bool belongs[kParts] = {true, contact, zone == Zone::flat, zone == Zone::air,
+                                contact && contact_level && on_edge(truth, silent)};
+  for (std::size_t p = 0; p < kParts; ++p)
+    if (belongs[p]) parts_[p].add(output, truth, scores, silent);
 }
 
 nlohmann::ordered_json ZoneMetrics::to_json() const {
+  constexpr const char* kNames[kParts] = {"all", "contact", "flat", "air", "edge"};
   nlohmann::ordered_json json;
-  json["all"] = supertac::to_json(all());
-  json["contact"] = supertac::to_json(contact());
-  json["flat"] = supertac::to_json(flat());
-  json["air"] = supertac::to_json(air());
-  if (edge().windows > 0) json["edge"] = supertac::to_json(edge());
+  for (std::size_t p = 0; p < kParts; ++p)
+    if (const Metrics metrics = parts_[p].result(); p != kEdge || metrics.windows > 0)
+      json[kNames[p]] = supertac::to_json(metrics);
   return json;
 }
 

@@ -157,21 +157,20 @@ class ZoneMetrics {
   /// std::invalid_argument when a size is wrong or a value of the output is not finite.
   void add(std::span<const float> output, std::span<const float> truth, Zone zone,
            std::optional<float> contact_level = {});
-  Metrics all() const { return all_.result(); }
-  Metrics contact() const { return contact_.result(); }
-  Metrics flat() const { return flat_.result(); }
-  Metrics air() const { return air_.result(); }
-  Metrics edge() const { return edge_.result(); }
+  Metrics all() const { return parts_[kAll].result(); }
+  Metrics contact() const { return parts_[kContact].result(); }
   /// {"all": {...}, "contact": {...}, "flat": {...}, "air": {...}}, of measured truths "edge" besides
   nlohmann::ordered_json to_json() const;
 
  private:
+  enum Part { kAll, kContact, kFlat, kAir, kEdge, kParts };
   ImageScores scores_of(std::span<const float> output, std::span<const float> truth);
+
+  bool on_edge(std::span<const float> truth, float level) const;
 
   ImageGrid grid_;
   PhaseCorrelator correlator_;
-  bool on_edge(std::span<const float> truth, float level) const;
-  MetricsAccumulator all_, contact_, flat_, air_, edge_;
+  std::vector<MetricsAccumulator> parts_;  // [kParts]
 };
 
 }  // namespace supertac

@@ -47,7 +47,6 @@ class Scene {
   void pressure(double t, const Body& body, double give_mm, const Field& field,
                 std::span<double> pressure) const;
 
- private:
   struct Wave {
     double x_per_mm, y_per_mm, phase, height;  // in turns, and standard deviations
   };
@@ -60,13 +59,8 @@ class Scene {
     std::vector<double> shape;  // strokes of a letter
     std::vector<Wave> waves;    // of a surface
   };
-  static Contact draw(int kind, const Objects& objects, const TaxelArray& array, const RandomStream& random,
-                      std::uint64_t first);
-  static std::vector<Wave> draw_waves(double size, double pitch, double length, const RandomStream& random,
-                                      std::uint64_t first);
-  static std::vector<double> heights(const Contact& contact, double x0_mm, double y0_mm, const Field& field);
-  static double inside_mm(const Contact& contact, double x_mm, double y_mm);
 
+ private:
   std::vector<Contact> contacts_;
 };
 

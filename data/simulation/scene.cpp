@@ -69,34 +69,35 @@ double distance_to_stroke(const double* stroke, double x, double y) {
   return std::sqrt(ax * ax + ay * ay);
 }
 
-}  // namespace
-
-const std::vector<std::string>& press_kinds() { return kKinds; }
-
-Scene::Scene(const Objects& objects, const TaxelArray& array, const RandomStream& random) {
-  const auto found = std::ranges::find(kKinds, objects.kind);
-  if (found == kKinds.end())
-    throw std::invalid_argument("presses: expected a kind of object (" + joined(kKinds, ", ") + "), got " +
-                                in_quotes(objects.kind));
-  const auto named = static_cast<int>(found - kKinds.begin());
-  const double u = random.uniform(kCount);
-  const auto count = static_cast<std::uint64_t>(std::ranges::upper_bound(kCounts, u) - kCounts.begin());
-  for (std::uint64_t i = 1; i <= count; ++i) {
-    const std::uint64_t first = i * kNumbersOfAContact;
-    const int one = named == kMixed
-                        ? static_cast<int>(random.uniform(first + kOfKind) * static_cast<int>(kMixed))
-                        : named;
-    contacts_.push_back(draw(one, objects, array, random, first));
+// A Gaussian random field of standard deviation 1 whose spectrum is a power law (self-affine, as rough
+// surfaces are) and whose longest wave is `size` of the way from one pitch to twice the array.
+std::vector<Scene::Wave> draw_waves(double size, double pitch, double length, const RandomStream& random,
+                                    std::uint64_t first) {
+  const double shortest = kShortestWave * pitch,
+               longest = 2 * shortest * same_bits::pow(length / shortest, size);
+  const double steepness = kSteepest * random.uniform(first);
+  std::vector<Scene::Wave> waves;
+  double squares = 0;
+  for (std::uint64_t k = first + 1; k <= first + 3 * kWavesOfASurface; k += 3) {
+    const double mm = shortest * same_bits::pow(longest / shortest, random.uniform(k)),
+                 turn = random.uniform(k + 1);
+    waves.push_back({.x_per_mm = same_bits::cosine(turn) / mm,
+                     .y_per_mm = same_bits::sine(turn) / mm,
+                     .phase = random.uniform(k + 2),
+                     .height = same_bits::pow(mm / longest, steepness)});
+    squares += waves.back().height * waves.back().height / 2;
   }
+  for (Scene::Wave& wave : waves) wave.height /= std::sqrt(squares);
+  return waves;
 }
 
-Scene::Contact Scene::draw(int kind, const Objects& objects, const TaxelArray& array,
-                           const RandomStream& random, std::uint64_t first) {
+Scene::Contact draw(int kind, const Scene::Objects& objects, const TaxelArray& array,
+                    const RandomStream& random, std::uint64_t first) {
   const auto uniform = [&](std::uint64_t number) { return random.uniform(first + number); };
   const double pitch = std::sqrt(array.pitch_mm.x * array.pitch_mm.y);
   const double width = array.columns * array.pitch_mm.x, height = array.rows * array.pitch_mm.y;
   const double largest = std::min(kLargest * pitch, std::max(width, height) / 3);
-  Contact c;
+  Scene::Contact c;
   c.kind = kind;
   c.x_mm = width * (uniform(kX) - 0.5), c.y_mm = height * (uniform(kY) - 0.5);
   c.cosine = same_bits::cosine(uniform(kTurn)), c.sine = same_bits::sine(uniform(kTurn));
@@ -109,7 +110,8 @@ Scene::Contact Scene::draw(int kind, const Objects& objects, const TaxelArray& a
   c.edge_mm = std::max(kHardEdge * c.size_mm, middle * softest);
   c.most = std::lerp(0.15, 1.0, uniform(kMost));
   c.down_s = 0.3 * uniform(kDown), c.loaded_s = c.down_s + std::lerp(0.03, 0.3, uniform(kDown + 20));
-  c.up_s = kSeconds - 0.2 * uniform(kUp), c.lifting_s = c.up_s - std::lerp(0.03, 0.3, uniform(kUp + 20));
+  c.up_s = Scene::kSeconds - 0.2 * uniform(kUp),
+  c.lifting_s = c.up_s - std::lerp(0.03, 0.3, uniform(kUp + 20));
   if (uniform(kMoves) < 0.4) {
     const double speed = 2 * pitch * uniform(kSpeed);
     c.move_x_mm_s = speed * same_bits::cosine(uniform(kWhere));
@@ -125,32 +127,10 @@ Scene::Contact Scene::draw(int kind, const Objects& objects, const TaxelArray& a
   return c;
 }
 
-// A Gaussian random field of standard deviation 1 whose spectrum is a power law (self-affine, as rough
-// surfaces are) and whose longest wave is `size` of the way from one pitch to twice the array.
-std::vector<Scene::Wave> Scene::draw_waves(double size, double pitch, double length,
-                                           const RandomStream& random, std::uint64_t first) {
-  const double shortest = kShortestWave * pitch,
-               longest = 2 * shortest * same_bits::pow(length / shortest, size);
-  const double steepness = kSteepest * random.uniform(first);
-  std::vector<Wave> waves;
-  double squares = 0;
-  for (std::uint64_t k = first + 1; k <= first + 3 * kWavesOfASurface; k += 3) {
-    const double mm = shortest * same_bits::pow(longest / shortest, random.uniform(k)),
-                 turn = random.uniform(k + 1);
-    waves.push_back({.x_per_mm = same_bits::cosine(turn) / mm,
-                     .y_per_mm = same_bits::sine(turn) / mm,
-                     .phase = random.uniform(k + 2),
-                     .height = same_bits::pow(mm / longest, steepness)});
-    squares += waves.back().height * waves.back().height / 2;
-  }
-  for (Wave& wave : waves) wave.height /= std::sqrt(squares);
-  return waves;
-}
-
 // Heights [rows][columns] of a contact's waves: of each, cos(x + y) = cos x cos y - sin x sin y.
-std::vector<double> Scene::heights(const Contact& c, double x0_mm, double y0_mm, const Field& field) {
+std::vector<double> heights(const Scene::Contact& c, double x0_mm, double y0_mm, const Field& field) {
   std::vector<double> heights(field.cells());
-  for (const Wave& wave : c.waves) {
+  for (const Scene::Wave& wave : c.waves) {
     std::vector<double> cosines, sines;
     for (int column = 0; column < field.columns; ++column) {
       const double turns = wave.x_per_mm * (field.x_mm(column) - x0_mm) + wave.phase;
@@ -168,7 +148,7 @@ std::vector<double> Scene::heights(const Contact& c, double x0_mm, double y0_mm,
 }
 
 // How far within the outline a point lies (x, y from the object's middle, turned with it), below 0 outside.
-double Scene::inside_mm(const Contact& c, double x, double y) {
+double inside_mm(const Scene::Contact& c, double x, double y) {
   const double from_middle = std::sqrt(x * x + y * y);
   switch (c.kind) {
     case kBar: {
@@ -191,6 +171,27 @@ double Scene::inside_mm(const Contact& c, double x, double y) {
     }
     default:
       return c.size_mm - from_middle;
+  }
+}
+
+}  // namespace
+
+const std::vector<std::string>& press_kinds() { return kKinds; }
+
+Scene::Scene(const Objects& objects, const TaxelArray& array, const RandomStream& random) {
+  const auto found = std::ranges::find(kKinds, objects.kind);
+  if (found == kKinds.end())
+    throw std::invalid_argument("presses: expected a kind of object (" + joined(kKinds, ", ") + "), got " +
+                                in_quotes(objects.kind));
+  const auto named = static_cast<int>(found - kKinds.begin());
+  const double u = random.uniform(kCount);
+  const auto count = static_cast<std::uint64_t>(std::ranges::upper_bound(kCounts, u) - kCounts.begin());
+  for (std::uint64_t i = 1; i <= count; ++i) {
+    const std::uint64_t first = i * kNumbersOfAContact;
+    const int one = named == kMixed
+                        ? static_cast<int>(random.uniform(first + kOfKind) * static_cast<int>(kMixed))
+                        : named;
+    contacts_.push_back(draw(one, objects, array, random, first));
   }
 }
 

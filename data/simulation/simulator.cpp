@@ -44,27 +44,18 @@ constexpr int kRows = static_cast<int>((rig::kPlateLengthMm + 2 * kMarginMm) / k
 double factor(double v) { return v >= 0 ? 1 + v : 1 / (1 - v); }
 
 // Weights of `points` places, `step` apart, for the lines (columns or rows) of taxels, [lines][points]; each
-// line sums to 1.
-std::vector<double> taxel_weights(int lines, double pitch, int points, double step, double sigma) {
+// line sums to 1. `lean`: each times how many sigmas its place lies from the line, which sums to the lean of
+// a load.
+std::vector<double> taxel_weights(int lines, double pitch, int points, double step, double sigma,
+                                  bool lean = false) {
   std::vector<double> weights;
   for (int line = 0; line < lines; ++line) {
-    const double at = (line - (lines - 1) / 2.0) * pitch;
-    const auto weight = [&](int i) { return same_bits::bell(step * (i - points / 2) - at, sigma); };
+    const auto off = [&](int i) { return step * (i - points / 2) - (line - (lines - 1) / 2.0) * pitch; };
     double sum = 0;
-    for (int i = 0; i < points; ++i) sum += weight(i);
-    for (int i = 0; i < points; ++i) weights.push_back(weight(i) / sum);
-  }
-  return weights;
-}
-
-// The same weights, each times how many sigmas its place lies from the line, which sums to the lean of a
-// load.
-std::vector<double> leaning(std::vector<double> weights, int lines, double pitch, double step, double sigma) {
-  const auto points = static_cast<int>(weights.size()) / lines;
-  for (int line = 0; line < lines; ++line)
+    for (int i = 0; i < points; ++i) sum += same_bits::bell(off(i), sigma);
     for (int i = 0; i < points; ++i)
-      weights[static_cast<std::size_t>(line * points + i)] *=
-          (step * (i - points / 2) - (line - (lines - 1) / 2.0) * pitch) / sigma;
+      weights.push_back(same_bits::bell(off(i), sigma) / sum * (lean ? off(i) / sigma : 1));
+  }
   return weights;
 }
 
@@ -132,8 +123,8 @@ void FingerModel::shape_pad(double slope_x, double slope_y) {
     settings_.mount_stiffness *= points(settings_.array) / points(TaxelArray{});
   across_weight_ = taxel_weights(columns, pitch.x, across_, kAcrossMm, sigma);
   along_weight_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma);
-  across_lean_ = leaning(across_weight_, columns, pitch.x, kAcrossMm, sigma);
-  along_lean_ = leaning(along_weight_, rows, pitch.y, kAlongMm, sigma);
+  across_lean_ = taxel_weights(columns, pitch.x, across_, kAcrossMm, sigma, true);
+  along_lean_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma, true);
   double lowest = 0;
   for (int i = 0; i < across_; ++i)
     for (int j = 0; j < along_; ++j) {

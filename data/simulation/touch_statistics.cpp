@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include "data/simulation/fit.h"
-#include "io/numbers/median.h"
 
 namespace supertac {
 namespace {

@@ -193,13 +193,13 @@ TEST(ZoneMetrics, CountsGhostsAndMisses) {
   metrics.add(ghost, flat(0), Zone::near);  // part of `all` alone
   metrics.add(plate("bumps12", 54), plate("bumps12", 54), Zone::contact);
   metrics.add(flat(0.19F), plate("bumps12", 54), Zone::contact);
-  EXPECT_EQ(metrics.flat().ghost_rate, 0.5);
-  EXPECT_EQ(metrics.air().ghost_rate, 0);
   EXPECT_EQ(metrics.contact().miss_rate, 0.5);
   EXPECT_EQ(metrics.all().ghost_rate, 0.5);
-  EXPECT_TRUE(std::isnan(metrics.flat().miss_rate));
-  EXPECT_EQ(metrics.to_json()["flat"]["ghost_rate"], 0.5);
-  EXPECT_EQ(metrics.to_json()["air"]["windows"], 1);
+  const auto json = metrics.to_json();
+  EXPECT_EQ(json["flat"]["ghost_rate"], 0.5);
+  EXPECT_TRUE(json["flat"]["miss_rate"].is_null());
+  EXPECT_EQ(json["air"]["ghost_rate"], 0);
+  EXPECT_EQ(json["air"]["windows"], 1);
 }
 
 TEST(ZoneMetrics, ReportsContactApart) {
