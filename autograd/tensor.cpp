@@ -35,8 +35,8 @@ std::string Shape::text() const {
   return out + "]";
 }
 
-Tensor::Tensor(const Shape& shape) : size_(shape.elements()), shape_(shape) {
-  const std::size_t bytes = static_cast<std::size_t>(size_) * sizeof(real);
+Tensor::Tensor(const Shape& shape) : shape_(shape) {
+  const std::size_t bytes = static_cast<std::size_t>(shape.elements()) * sizeof(real);
   values_ = {static_cast<real*>(pool_allocate(bytes)), [bytes](real* values) { pool_release(values, bytes); },
              PoolAllocator<real>()};
 }
@@ -58,9 +58,7 @@ Tensor Tensor::of(const Shape& shape, std::span<const real> values) {
 
 Tensor Tensor::clone() const {
   if (!defined()) return {};
-  Tensor t(shape_);
-  std::copy_n(data(), size_, t.data());
-  return t;
+  return of(shape_, values());
 }
 
 void Tensor::fill(real value) { std::ranges::fill(values(), value); }

@@ -75,7 +75,7 @@ class Tensor {
   const Shape& shape() const { return shape_; }
   int rank() const { return shape_.rank(); }
   Dim dim(int i) const { return shape_[i]; }
-  Dim size() const { return defined() ? size_ : 0; }
+  Dim size() const { return defined() ? shape_.elements() : 0; }
   /// Of its shape, "[4,16,16,32]"; "none" where it has no buffer.
   std::string text() const { return defined() ? shape_.text() : "none"; }
 
@@ -92,7 +92,6 @@ class Tensor {
 
  private:
   std::shared_ptr<real> values_;  // from the pool, aligned for vectors
-  Dim size_ = 0;
   Shape shape_;
 };
 

@@ -59,21 +59,6 @@ void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, Slot gw) {
   for_each_product(s, [&](Dim a, Dim b, Dim c) { gw.data[b] = std::fma(x[a], gy[c], gw.data[b]); });
 }
 
-// Rows are images of one pixel: x [n, i], w [i, o], y [n, o].
-void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
-            real* y) {
-  if (!is_plain()) return fast::linear(rows, cin, cout, x, w, bias, negative_slope, y);
-  conv({{}, rows, cin, cout}, x, w, bias, negative_slope, y);
-}
-void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Slot gx) {
-  if (gx && !is_plain()) return fast::linear_grad_x(rows, cin, cout, gy, w, gx);
-  conv_grad_x({{}, rows, cin, cout}, gy, w, gx);
-}
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Slot gw) {
-  if (gw && !is_plain()) return fast::linear_grad_w(rows, cin, cout, x, gy, gw);
-  conv_grad_w({{}, rows, cin, cout}, x, gy, gw);
-}
-
 // gb[o] = or += sum over rows of gy[row,o]
 void bias_grad(Dim rows, Dim cout, const real* gy, Slot gb) {
   constexpr Dim kAtOnce = 16;  // sums that stay in registers

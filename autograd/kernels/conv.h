@@ -90,10 +90,16 @@ void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Slot gx)
 void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Slot gw);
 /// A linear layer is a convolution of maps of one pixel: y [rows, cout] = f(bias + x [rows, cin] w [cin,
 /// cout]), gx = or += gy w^T, gw = or += x^T gy.
-void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
-            real* y);
-void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Slot gx);
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Slot gw);
+inline void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias,
+                   real negative_slope, real* y) {
+  conv({{}, rows, cin, cout}, x, w, bias, negative_slope, y);
+}
+inline void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Slot gx) {
+  conv_grad_x({{}, rows, cin, cout}, gy, w, gx);
+}
+inline void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Slot gw) {
+  conv_grad_w({{}, rows, cin, cout}, x, gy, gw);
+}
 /// gb [cout] = or += the sum of gy [rows, cout] over rows: the pixels of all images.
 void bias_grad(Dim rows, Dim cout, const real* gy, Slot gb);
 

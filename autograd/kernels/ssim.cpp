@@ -1,9 +1,11 @@
 // Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004) and its gradient.
+#include "autograd/kernels/ssim.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "autograd/kernels/losses.h"
+#include "autograd/kernels/fast/each.h"
 
 namespace supertac::kernels {
 namespace {

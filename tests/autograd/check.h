@@ -11,6 +11,7 @@
 #include "autograd/ops/arithmetic.h"
 #include "autograd/tensor.h"
 #include "autograd/variable.h"
+#include "io/numbers/hash.h"
 #include "tests/support/test.h"
 
 namespace supertac::test {
@@ -22,10 +23,8 @@ inline constexpr double kRounding = sizeof(real) == 4 ? 2e-6 : 1e-14;
 inline Tensor numbers(const Shape& shape, std::uint64_t seed = 1, double low = -1, double high = 1) {
   Tensor t(shape);
   for (Dim i = 0; i < t.size(); ++i) {
-    std::uint64_t z = (seed << 32) + static_cast<std::uint64_t>(i + 1) * 0x9E3779B97F4A7C15U;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
-    const double unit = static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+    const std::uint64_t z = mix64((seed << 32) + static_cast<std::uint64_t>(i + 1) * kGolden64);
+    const double unit = static_cast<double>(z >> 11) * 0x1p-53;
     t.data()[i] = static_cast<real>(low + (high - low) * unit);
   }
   return t;

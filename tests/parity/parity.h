@@ -12,6 +12,7 @@
 
 #include "autograd/tensor.h"
 #include "io/files/safetensors.h"
+#include "io/numbers/hash.h"
 #include "layers/checkpoint.h"
 
 namespace supertac::test {
@@ -22,10 +23,7 @@ inline std::vector<double> counter_numbers(const std::string& name, std::size_t 
   for (const char c : name) key = (key ^ static_cast<unsigned char>(c)) * 0x100000001B3U;
   std::vector<double> values(count);
   for (std::size_t i = 0; i < count; ++i) {
-    std::uint64_t z = key + (i + 1) * 0x9E3779B97F4A7C15U;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
-    z ^= z >> 31;
+    const std::uint64_t z = mix64(key + (i + 1) * kGolden64);
     values[i] = bound * (static_cast<double>(z >> 40) * 0x1p-23 - 1);
   }
   return values;

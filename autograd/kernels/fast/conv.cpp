@@ -7,6 +7,8 @@
 namespace supertac::kernels::fast {
 namespace {
 
+const ConvSettings kOnePixel{};  // of a linear layer, whose rows are images
+
 void gather_batch(const GatherJob& job, Dim images, Dim in_pixels, Dim out_pixels, const real* x, real* y) {
   const auto gather = isa_kernels().gather;
   for (Dim n = 0; n < images; ++n) gather(job, x + n * in_pixels * job.cin, y + n * out_pixels * job.cout);
@@ -24,7 +26,9 @@ Tensor transposed_weights(const real* weights, Dim taps, Dim cin, Dim cout) {
 void conv(const ConvSizes& s, const real* x, const real* w, const real* bias, real negative_slope, real* y) {
   if (is_narrow(s)) return narrow_conv(s, x, w, bias, negative_slope, y);
   if (is_winograd(s)) return winograd_conv(s, x, w, bias, negative_slope, y);
-  const GatherJob job{&geometry_of(s.conv).forward, w, bias, s.cin, s.cout, Into::overwrite, negative_slope};
+  GatherJob job{nullptr, w, bias, s.cin, s.cout, Into::overwrite, negative_slope};
+  if (s.conv == kOnePixel) return isa_kernels().gather_rows(job, x, y, s.images);
+  job.phases = &geometry_of(s.conv).forward;
   gather_batch(job, s.images, s.in_pixels(), s.out_pixels(), x, y);
 }
 
@@ -32,7 +36,9 @@ void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, Slot gx) {
   if (is_narrow(s)) return narrow_grad_x(s, gy, w, gx);
   if (is_winograd(s)) return winograd_grad_x(s, gy, w, gx);
   const Tensor wt = transposed_weights(w, s.conv.taps(), s.cin, s.cout);
-  const GatherJob job{&geometry_of(s.conv).backward, wt.data(), nullptr, s.cout, s.cin, gx.into, 1};
+  GatherJob job{nullptr, wt.data(), nullptr, s.cout, s.cin, gx.into, 1};
+  if (s.conv == kOnePixel) return isa_kernels().gather_rows(job, gy, gx.data, s.images);
+  job.phases = &geometry_of(s.conv).backward;
   gather_batch(job, s.images, s.out_pixels(), s.in_pixels(), gy, gx.data);
 }
 
@@ -41,8 +47,9 @@ void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, Slot gw) {
   if (s.images == 0) gw.begin(s.conv.taps() * s.cin * s.cout);
   if (is_narrow(s)) return narrow_grad_w(s, x, gy, gw);
   if (is_winograd(s)) return winograd_grad_w(s, x, gy, gw);
+  static const std::vector<TapPairs> kOnePair{{{0}, {0}}};
   const auto outer = isa_kernels().outer;
-  const Geometry& g = geometry_of(s.conv);
+  const std::vector<TapPairs>& taps = s.conv == kOnePixel ? kOnePair : geometry_of(s.conv).pairs;
   const Dim in_pixels = s.in_pixels(), out_pixels = s.out_pixels();
   const Dim chunk = std::max<Dim>(1, kRowsPerPiece / out_pixels);
   for (Dim n = 0; n < s.images; n += chunk) {
@@ -56,31 +63,11 @@ void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, Slot gw) {
                  s.cin,
                  s.cout,
                  n == 0 ? gw.into : Into::add};
-    for (const TapPairs& pairs : g.pairs) {
+    for (const TapPairs& pairs : taps) {
       job.pairs = &pairs;
       outer(job);
       job.gw += s.cin * s.cout;
     }
-  }
-}
-
-void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
-            real* y) {
-  isa_kernels().gather_rows({nullptr, w, bias, cin, cout, Into::overwrite, negative_slope}, x, y, rows);
-}
-
-void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Slot gx) {
-  const Tensor wt = transposed_weights(w, 1, cin, cout);
-  isa_kernels().gather_rows({nullptr, wt.data(), nullptr, cout, cin, gx.into, 1}, gy, gx.data, rows);
-}
-
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Slot gw) {
-  static const TapPairs kOnePixel{{0}, {0}};
-  const auto outer = isa_kernels().outer;
-  if (rows == 0) gw.begin(cin * cout);
-  for (Dim n = 0; n < rows; n += kRowsPerPiece) {
-    outer({&kOnePixel, x + n * cin, gy + n * cout, gw.data, std::min(kRowsPerPiece, rows - n), 1, 1, cin,
-           cout, n == 0 ? gw.into : Into::add});
   }
 }
 

@@ -13,11 +13,6 @@ void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Slot gx)
 /// Partial sums over fixed groups of images, added in order.
 void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Slot gw);
 
-void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
-            real* y);
-void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Slot gx);
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Slot gw);
-
 /// w [taps][cin][cout] -> [taps][cout][cin]
 Tensor transposed_weights(const real* w, Dim taps, Dim cin, Dim cout);
 

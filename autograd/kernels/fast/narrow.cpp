@@ -146,8 +146,8 @@ void narrow_grad_x(const ConvSizes& s, const real* gy, const real* w, Slot gx) {
 
 void narrow_grad_w(const ConvSizes& s, const real* x, const real* gy, Slot gw) {
   Tensor inside(Shape{sums_of(s), s.cin});
-  fast::linear_grad_w(s.images * s.in_pixels(), sums_of(s), s.cin, expanded(s, gy).data(), x,
-                      {inside.data(), Into::overwrite});
+  linear_grad_w(s.images * s.in_pixels(), sums_of(s), s.cin, expanded(s, gy).data(), x,
+                {inside.data(), Into::overwrite});
   for (Dim t = 0; t < s.conv.taps(); ++t) {
     for (Dim i = 0; i < s.cin; ++i) {
       for (Dim o = 0; o < s.cout; ++o, ++gw.data) {

@@ -96,9 +96,9 @@ void winograd_grad_w(const ConvSizes& s, const real* x, const real* gy, Slot gw)
     isa.patches(tiles(s, s.cin, first, count), x, v.data());
     isa.square_grads(tiles(s, s.cout, first, count), gy, m.data());
     for (Dim place = 0; place < kPlaces; ++place) {
-      fast::linear_grad_w(count, s.cin, s.cout, v.data() + place * place_step(count, s.cin),
-                          m.data() + place * place_step(count, s.cout),
-                          {du.data() + place * place_of(s), first == 0 ? Into::overwrite : Into::add});
+      linear_grad_w(count, s.cin, s.cout, v.data() + place * place_step(count, s.cin),
+                    m.data() + place * place_step(count, s.cout),
+                    {du.data() + place * place_of(s), first == 0 ? Into::overwrite : Into::add});
     }
   }
   isa.filter_grads({s.cin * s.cout, place_of(s), 4, gw.into}, du.data(), gw.data);

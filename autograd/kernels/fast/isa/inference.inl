@@ -23,67 +23,37 @@ struct Cursor {
 template <int P, int J, bool kPartial>
 inline void product_tile(const ProductJob& job, const real* const (&x)[P], real* const (&y)[P], Dim channel) {
   const Outputs<J, kPartial> channels(job.cout, channel);
-  Vec sum[P][J];
+  Tile<P, J> tile;
   for (int j = 0; j < J; ++j) {
     const Vec start = job.bias == nullptr ? Vec::broadcast(0) : channels.load(job.bias + channel, j);
-    for (int p = 0; p < P; ++p) sum[p][j] = start;
+    for (int p = 0; p < P; ++p) tile.sum[p][j] = start;
   }
   const real* w = job.w + channel;
-  for (Dim s = 0; s < job.segment_count; ++s) {
-    const Dim offset = job.segments[s];
-    const real* pixel[P];
-    for (int p = 0; p < P; ++p) pixel[p] = x[p] + offset;
-#pragma GCC unroll 4
-    for (Dim k = 0; k < job.length; ++k, w += job.cout) {
-      Vec weight[J];
-      for (int j = 0; j < J; ++j) weight[j] = channels.load(w, j);
-      for (int p = 0; p < P; ++p) {
-        const Vec value = Vec::broadcast(pixel[p][k]);
-        for (int j = 0; j < J; ++j) sum[p][j] = Vec::fma(value, weight[j], sum[p][j]);
-      }
-    }
+  for (Dim s = 0; s < job.segment_count; ++s, w += job.length * job.cout) {
+    for (int p = 0; p < P; ++p) tile.pixel[p] = x[p] + job.segments[s];
+    add_tap<(1U << P) - 1>(tile, w, job.length, job.cout, channels);
   }
   for (int p = 0; p < P; ++p) {
-    for (int j = 0; j < J; ++j) channels.store(rectified(sum[p][j], job.negative_slope), y[p] + channel, j);
+    for (int j = 0; j < J; ++j)
+      channels.store(rectified(tile.sum[p][j], job.negative_slope), y[p] + channel, j);
   }
-}
-
-template <int P>
-inline void product_pixels(const ProductJob& job, Cursor& cursor) {
-  const real* x[P];
-  real* y[P];
-  for (int p = 0; p < P; ++p, cursor.next()) x[p] = cursor.x, y[p] = cursor.y;
-  Dim channel = 0;
-  if constexpr (P <= 2) {  // few pixels need more vectors to hide the latency of FMA
-    for (; channel + 4 * Vec::kLanes <= job.cout; channel += 4 * Vec::kLanes) {
-      product_tile<P, 4, false>(job, x, y, channel);
-    }
-  }
-  if constexpr (P <= kTilePixels) {
-    for (; channel + 2 * Vec::kLanes <= job.cout; channel += 2 * Vec::kLanes) {
-      product_tile<P, 2, false>(job, x, y, channel);
-    }
-  }
-  for (; channel + Vec::kLanes <= job.cout; channel += Vec::kLanes) {
-    product_tile<P, 1, false>(job, x, y, channel);
-  }
-  if (channel < job.cout) product_tile<P, 1, true>(job, x, y, channel);
 }
 
 void product(const ProductJob& job, const real* x, real* y) {
   Cursor cursor{job, x, y};
-  Dim left = job.images * job.height * job.width;
-  if (job.cout <= Vec::kLanes) {  // one vector of outputs: more pixels instead
-    for (; left >= kNarrowTilePixels; left -= kNarrowTilePixels) {
-      product_pixels<kNarrowTilePixels>(job, cursor);
-    }
-  }
-  for (; left >= kTilePixels; left -= kTilePixels) product_pixels<kTilePixels>(job, cursor);
-  if constexpr (kTilePixels > 4) {
-    for (; left >= 4; left -= 4) product_pixels<4>(job, cursor);
-  }
-  for (; left >= 2; left -= 2) product_pixels<2>(job, cursor);
-  if (left > 0) product_pixels<1>(job, cursor);
+  const auto tile = [&]<int P>(Dim) INLINED {
+    const real* from[P];
+    real* to[P];
+    for (int p = 0; p < P; ++p, cursor.next()) from[p] = cursor.x, to[p] = cursor.y;
+    // Few pixels need more vectors to hide the latency of FMA.
+    constexpr int kMost = P <= 2 ? 4 : P <= kTilePixels ? 2 : 1;
+    in_vectors<kMost>(job.cout, [&]<int J, bool kPartial>(Dim channel)
+                                    INLINED { product_tile<P, J, kPartial>(job, from, to, channel); });
+  };
+  const Dim pixels = job.images * job.height * job.width;
+  // Where there is one vector of outputs: more pixels instead.
+  job.cout <= Vec::kLanes ? in_tiles<kNarrowTilePixels, kTilePixels, 4, 2, 1>(pixels, tile)
+                          : in_tiles<kTilePixels, 4, 2, 1>(pixels, tile);
 }
 
 // A vector of channels of a map that may be the last, partial one.
@@ -107,32 +77,30 @@ ALWAYS_INLINE void for_each_vector(const MapJob& job, Work work) {
 }
 
 void gate(const MapJob& job, const real* a, const real* x, const real* gates, real* y) {
-  for_each_vector(
-      job, [&](Dim image, Dim c, Lanes lanes) __attribute__((always_inline)) {
-        const Vec factor = gates ? lanes.load(gates + image * job.channels + c) : Vec::broadcast(1);
-        for (Dim i = 0; i < job.height; ++i) {
-          const real* from = a + image * job.a.image + i * job.a.line + c;
-          const real* change = x + image * job.x.image + i * job.x.line + c;
-          real* to = y + image * job.y.image + i * job.y.line + c;
-          for (Dim j = 0; j < job.width; ++j) {
-            lanes.store(Vec::fma(lanes.load(change), factor, lanes.load(from)), to);
-            from += job.a.pixel, change += job.x.pixel, to += job.y.pixel;
-          }
-        }
-      });
+  for_each_vector(job, [&](Dim image, Dim c, Lanes lanes) INLINED {
+    const Vec factor = gates ? lanes.load(gates + image * job.channels + c) : Vec::broadcast(1);
+    for (Dim i = 0; i < job.height; ++i) {
+      const real* from = a + image * job.a.image + i * job.a.line + c;
+      const real* change = x + image * job.x.image + i * job.x.line + c;
+      real* to = y + image * job.y.image + i * job.y.line + c;
+      for (Dim j = 0; j < job.width; ++j) {
+        lanes.store(Vec::fma(lanes.load(change), factor, lanes.load(from)), to);
+        from += job.a.pixel, change += job.x.pixel, to += job.y.pixel;
+      }
+    }
+  });
 }
 
 void mean(const MapJob& job, const real* x, real* to) {
   const Vec share = Vec::broadcast(1 / static_cast<real>(job.height * job.width));
-  for_each_vector(
-      job, [&](Dim image, Dim c, Lanes lanes) __attribute__((always_inline)) {
-        Vec sum = Vec::broadcast(0);
-        for (Dim i = 0; i < job.height; ++i) {
-          const real* from = x + image * job.x.image + i * job.x.line + c;
-          for (Dim j = 0; j < job.width; ++j, from += job.x.pixel) sum = Vec::add(sum, lanes.load(from));
-        }
-        lanes.store(Vec::fma(sum, share, Vec::broadcast(0)), to + image * job.channels + c);
-      });
+  for_each_vector(job, [&](Dim image, Dim c, Lanes lanes) INLINED {
+    Vec sum = Vec::broadcast(0);
+    for (Dim i = 0; i < job.height; ++i) {
+      const real* from = x + image * job.x.image + i * job.x.line + c;
+      for (Dim j = 0; j < job.width; ++j, from += job.x.pixel) sum = Vec::add(sum, lanes.load(from));
+    }
+    lanes.store(Vec::fma(sum, share, Vec::broadcast(0)), to + image * job.channels + c);
+  });
 }
 
 // to[j * to_step + i] = from[i * from_step + j] for i < rows, j < columns
@@ -192,18 +160,13 @@ template <int O>
 inline void plane_outputs(const PlaneJob& job, const PlaneOutput* outputs, const real* x) {
   for (Dim column = 0; column < job.width; column += Vec::kLanes) {
     const Dim lanes = job.width - column < Vec::kLanes ? job.width - column : Vec::kLanes;
-    Dim row = 0;
-    for (; row + kPlaneRows <= job.height; row += kPlaneRows) {
-      plane_rows<kPlaneRows, O>(job, outputs, x + row * job.line + column, row * job.width + column, lanes);
-    }
-    for (; row < job.height; ++row) {
-      plane_rows<1, O>(job, outputs, x + row * job.line + column, row * job.width + column, lanes);
-    }
+    in_tiles<kPlaneRows, 1>(job.height, [&]<int R>(Dim row) INLINED {
+      plane_rows<R, O>(job, outputs, x + row * job.line + column, row * job.width + column, lanes);
+    });
   }
 }
 
 void plane_conv(const PlaneJob& job, const real* x) {
-  Dim o = 0;
-  for (; o + 2 <= job.output_count; o += 2) plane_outputs<2>(job, job.outputs + o, x);
-  if (o < job.output_count) plane_outputs<1>(job, job.outputs + o, x);
+  in_tiles<2, 1>(job.output_count,
+                 [&]<int O>(Dim first) INLINED { plane_outputs<O>(job, job.outputs + first, x); });
 }

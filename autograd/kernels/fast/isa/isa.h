@@ -21,7 +21,6 @@ struct GatherJob {
   Dim cin = 0, cout = 0;
   Into into = Into::overwrite;  // add: start from what is in y instead of the bias
   real negative_slope = 1;      // 1: f is the identity
-  Dim x_step = 0;               // numbers from pixel to pixel of x; the kernels set it
 };
 
 /// gw[cin, cout] = or += the sum over images, then pairs, of x[image, input(pair), cin] * gy[image,

@@ -7,6 +7,33 @@
 // with -O3): the linker keeps one copy of it, which might then run on a processor without these instructions.
 
 #define ALWAYS_INLINE inline __attribute__((always_inline))
+// A function object that must not become a call.
+#define INLINED __attribute__((always_inline))
+
+// Calls run.operator()<P>(first) for tiles of P of `count`: of the first of these sizes as long as they fit,
+// then of the next.
+template <int... kSizes, class Run>
+ALWAYS_INLINE void in_tiles(Dim count, Run run) {
+  Dim first = 0;
+  const auto of_size = [&]<int P>() INLINED {
+    for (; first + P <= count; first += P) run.template operator()<P>(first);
+  };
+  (of_size.template operator()<kSizes>(), ...);
+}
+
+// Calls run.operator()<J, kPartial>(channel) for J vectors of output channels from `channel` on: kMost, 2 and
+// 1 at once as long as they fit, then what is left of one.
+template <int kMost, class Run>
+ALWAYS_INLINE void in_vectors(Dim cout, Run run) {
+  Dim channel = 0;
+  const auto of_size = [&]<int J>() INLINED {
+    if constexpr (J <= kMost)
+      for (; channel + J * Vec::kLanes <= cout; channel += J * Vec::kLanes)
+        run.template operator()<J, false>(channel);
+  };
+  of_size.template operator()<4>(), of_size.template operator()<2>(), of_size.template operator()<1>();
+  if (channel < cout) run.template operator()<1, true>(channel);
+}
 
 // Rectifier(negative_slope)(x)
 ALWAYS_INLINE Vec rectified(Vec x, real negative_slope) {
@@ -81,27 +108,36 @@ struct PixelSets {
   }
 };
 
+// What the pixels of a job gather (Phase), and where their inputs lie; `zeros` stand for the padding.
+struct Gathered {
+  const std::int32_t* taps;
+  Dim tap_count;
+  const std::int32_t *outputs, *sources;
+  const real *zeros, *x;
+  Dim x_step;  // from pixel to pixel of x
+  real* y;
+};
+
 template <int P, int J, bool kPartial>
-inline void gather_tile(const GatherJob& job, const std::int32_t* taps, Dim tap_count,
-                        const std::int32_t* outputs, const std::int32_t* sources, const real* zeros,
-                        const real* x, real* y, Dim channel) {
+inline void gather_tile(const GatherJob& job, const Gathered& g, Dim first, Dim channel) {
   constexpr unsigned kAll = (1U << P) - 1;
   const Outputs<J, kPartial> channels(job.cout, channel);
+  const std::int32_t *outputs = g.outputs + first, *sources = g.sources + first * g.tap_count;
   Tile<P, J> tile;
   for (int p = 0; p < P; ++p) {
-    const real* from = job.into == Into::add ? y + outputs[p] * job.cout + channel
+    const real* from = job.into == Into::add ? g.y + outputs[p] * job.cout + channel
                        : job.bias            ? job.bias + channel
                                              : nullptr;
     for (int j = 0; j < J; ++j) tile.sum[p][j] = from == nullptr ? Vec::broadcast(0) : channels.load(from, j);
   }
-  for (Dim t = 0; t < tap_count; ++t) {
+  for (Dim t = 0; t < g.tap_count; ++t) {
     unsigned pixels = 0;
     for (int p = 0; p < P; ++p) {
-      const std::int32_t source = sources[p * tap_count + t];
+      const std::int32_t source = sources[p * g.tap_count + t];
       pixels |= (source >= 0 ? 1U : 0U) << p;
-      tile.pixel[p] = source >= 0 ? x + source * job.x_step : zeros;
+      tile.pixel[p] = source >= 0 ? g.x + source * g.x_step : g.zeros;
     }
-    const real* w = job.w + taps[t] * job.cin * job.cout + channel;
+    const real* w = job.w + g.taps[t] * job.cin * job.cout + channel;
     if (pixels == kAll) {
       add_tap<kAll>(tile, w, job.cin, job.cout, channels);
     } else if (pixels != 0 && !BorderSetsOf<P>::Type::template add<P, J, kPartial>(pixels, tile, w, job.cin,
@@ -112,66 +148,33 @@ inline void gather_tile(const GatherJob& job, const std::int32_t* taps, Dim tap_
   // + 0 turns -0 into +0: a sum of -0 changes its sign where 0 * w is added for a tap in the padding, and not
   // where the tap is skipped, which depends on how many pixels share a tile.
   for (int p = 0; p < P; ++p) {
-    real* to = y + outputs[p] * job.cout + channel;
+    real* to = g.y + outputs[p] * job.cout + channel;
     for (int j = 0; j < J; ++j)
       channels.store(rectified(Vec::add(tile.sum[p][j], Vec::broadcast(0)), job.negative_slope), to, j);
   }
 }
 
-template <int P>
-inline void gather_channels(const GatherJob& job, const std::int32_t* taps, Dim tap_count,
-                            const std::int32_t* outputs, const std::int32_t* sources, const real* zeros,
-                            const real* x, real* y) {
-  Dim channel = 0;
-  if constexpr (P == 1) {  // a single pixel needs more vectors to hide the latency of FMA
-    for (; channel + 4 * Vec::kLanes <= job.cout; channel += 4 * Vec::kLanes) {
-      gather_tile<P, 4, false>(job, taps, tap_count, outputs, sources, zeros, x, y, channel);
-    }
-  }
-  if constexpr (P <= kTilePixels) {
-    for (; channel + 2 * Vec::kLanes <= job.cout; channel += 2 * Vec::kLanes) {
-      gather_tile<P, 2, false>(job, taps, tap_count, outputs, sources, zeros, x, y, channel);
-    }
-  }
-  for (; channel + Vec::kLanes <= job.cout; channel += Vec::kLanes) {
-    gather_tile<P, 1, false>(job, taps, tap_count, outputs, sources, zeros, x, y, channel);
-  }
-  if (channel < job.cout) {
-    gather_tile<P, 1, true>(job, taps, tap_count, outputs, sources, zeros, x, y, channel);
-  }
-}
-
-inline void gather_pixels(const GatherJob& job, const std::int32_t* taps, Dim tap_count,
-                          const std::int32_t* outputs, const std::int32_t* sources, Dim pixels,
-                          const real* zeros, const real* x, real* y) {
-  Dim q = 0;
-  if (job.cout <= Vec::kLanes) {  // one vector of channels: more pixels instead
-    for (; q + kNarrowTilePixels <= pixels; q += kNarrowTilePixels) {
-      gather_channels<kNarrowTilePixels>(job, taps, tap_count, outputs + q, sources + q * tap_count, zeros, x,
-                                         y);
-    }
-  }
-  for (; q + kTilePixels <= pixels; q += kTilePixels) {
-    gather_channels<kTilePixels>(job, taps, tap_count, outputs + q, sources + q * tap_count, zeros, x, y);
-  }
-  for (; q + 4 <= pixels; q += 4) {
-    gather_channels<4>(job, taps, tap_count, outputs + q, sources + q * tap_count, zeros, x, y);
-  }
-  for (; q < pixels; ++q) {
-    gather_channels<1>(job, taps, tap_count, outputs + q, sources + q * tap_count, zeros, x, y);
-  }
+inline void gather_pixels(const GatherJob& job, const Gathered& g, Dim pixels) {
+  const auto tile = [&]<int P>(Dim first) INLINED {
+    // A single pixel needs more vectors to hide the latency of FMA.
+    constexpr int kMost = P == 1 ? 4 : P <= kTilePixels ? 2 : 1;
+    in_vectors<kMost>(job.cout, [&]<int J, bool kPartial>(Dim channel)
+                                    INLINED { gather_tile<P, J, kPartial>(job, g, first, channel); });
+  };
+  // Where there is one vector of channels: more pixels instead.
+  job.cout <= Vec::kLanes ? in_tiles<kNarrowTilePixels, kTilePixels, 4, 1>(pixels, tile)
+                          : in_tiles<kTilePixels, 4, 1>(pixels, tile);
 }
 
 alignas(64) const real kZeros[kMaxChannels] = {};
 
-void gather(const GatherJob& whole, const real* x, real* y) {
-  GatherJob job = whole;
-  job.x_step = job.cin;
+void gather(const GatherJob& job, const real* x, real* y) {
   const Phase* phase = job.phases->data();
-  for (std::size_t i = 0; i < job.phases->size(); ++i, ++phase) {
-    gather_pixels(job, phase->taps.data(), static_cast<Dim>(phase->taps.size()), phase->outputs.data(),
-                  phase->sources.data(), static_cast<Dim>(phase->outputs.size()), kZeros, x, y);
-  }
+  for (std::size_t i = 0; i < job.phases->size(); ++i, ++phase)
+    gather_pixels(job,
+                  {phase->taps.data(), static_cast<Dim>(phase->taps.size()), phase->outputs.data(),
+                   phase->sources.data(), kZeros, x, job.cin, y},
+                  static_cast<Dim>(phase->outputs.size()));
 }
 
 const std::int32_t kFirstTap[1] = {0};
@@ -187,7 +190,6 @@ void gather_rows(const GatherJob& job, const real* x, real* y, Dim rows) {
   const bool whole = rows > kFewRows || job.cin * job.cout <= kNearWeights;
   const Dim inputs = whole ? job.cin : kNearWeights / job.cout < 8 ? 8 : kNearWeights / job.cout;
   GatherJob piece = job;
-  piece.x_step = job.cin;
   for (Dim row = 0; row < rows; row += kRows) {
     const Dim count = rows - row < kRows ? rows - row : kRows;
     Dim first = 0;
@@ -197,8 +199,10 @@ void gather_rows(const GatherJob& job, const real* x, real* y, Dim rows) {
       piece.cin = last ? job.cin - first : inputs;
       piece.into = first > 0 ? Into::add : job.into;
       piece.negative_slope = last ? job.negative_slope : 1;
-      gather_pixels(piece, kFirstTap, 1, kRowNumbers, kRowNumbers, count, nullptr, x + row * job.cin + first,
-                    y + row * job.cout);
+      gather_pixels(piece,
+                    {kFirstTap, 1, kRowNumbers, kRowNumbers, nullptr, x + row * job.cin + first, job.cin,
+                     y + row * job.cout},
+                    count);
       first += inputs;
     } while (first < job.cin);
   }
@@ -218,7 +222,7 @@ inline void outer_tile(const OuterJob& job, Dim row, Dim channel) {
       __builtin_prefetch(job.gw + (row + r) * job.cout + channel + j * Vec::kLanes, 1);
     }
   }
-  const auto add_pair = [&](const real* v, const real* g) __attribute__((always_inline)) {
+  const auto add_pair = [&](const real* v, const real* g) INLINED {
     Vec grad[J];
     for (int j = 0; j < J; ++j) grad[j] = channels.load(g, j);
     for (int r = 0; r < R; ++r) {
@@ -246,28 +250,13 @@ inline void outer_tile(const OuterJob& job, Dim row, Dim channel) {
   }
 }
 
-template <int R>
-inline void outer_channels(const OuterJob& job, Dim row) {
-  Dim channel = 0;
-  if constexpr (R <= kOuterRows) {
-    for (; channel + 2 * Vec::kLanes <= job.cout; channel += 2 * Vec::kLanes) {
-      outer_tile<R, 2, false>(job, row, channel);
-    }
-  }
-  for (; channel + Vec::kLanes <= job.cout; channel += Vec::kLanes) {
-    outer_tile<R, 1, false>(job, row, channel);
-  }
-  if (channel < job.cout) outer_tile<R, 1, true>(job, row, channel);
-}
-
 void outer(const OuterJob& job) {
-  Dim row = 0;
-  if (job.cout <= Vec::kLanes) {  // one vector of channels: more rows instead
-    for (; row + 2 * kOuterRows <= job.cin; row += 2 * kOuterRows) outer_channels<2 * kOuterRows>(job, row);
-  }
-  for (; row + kOuterRows <= job.cin; row += kOuterRows) outer_channels<kOuterRows>(job, row);
-  if constexpr (kOuterRows > 4) {
-    for (; row + 4 <= job.cin; row += 4) outer_channels<4>(job, row);
-  }
-  for (; row < job.cin; ++row) outer_channels<1>(job, row);
+  const auto tile = [&]<int R>(Dim row) INLINED {
+    in_vectors<R <= kOuterRows ? 2 : 1>(job.cout, [&]<int J, bool kPartial>(Dim channel) INLINED {
+      outer_tile<R, J, kPartial>(job, row, channel);
+    });
+  };
+  // Where there is one vector of channels: more rows instead.
+  job.cout <= Vec::kLanes ? in_tiles<2 * kOuterRows, kOuterRows, 4, 1>(job.cin, tile)
+                          : in_tiles<kOuterRows, 4, 1>(job.cin, tile);
 }

@@ -115,23 +115,17 @@ ALWAYS_INLINE void transform(Load load, Store store) {
     for (int i = 0; i < kOut; ++i) store(i, j, column[i]);
   }
 }
-// A function of transform(), which must not become a call.
-#define INLINED __attribute__((always_inline))
 
 struct TileCorner {
   Dim image, row, column;
 };
-template <int kSquare>
-ALWAYS_INLINE TileCorner corner_of(const TileJob& job, Dim tile) {
-  const Dim tiles = job.tiles_down * job.tiles_across, within = tile % tiles;
-  return {tile / tiles, within / job.tiles_across * kSquare, within % job.tiles_across * kSquare};
-}
-
 // Calls body(corner, channel, places from there on) for each tile of a job by a vector of channels.
 template <int kSquare, class Places, class Body>
 ALWAYS_INLINE void for_each_tile(const TileJob& job, Places* places, Body body) {
+  const Dim tiles = job.tiles_down * job.tiles_across;
   for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
-    const TileCorner at = corner_of<kSquare>(job, tile);
+    const Dim image = tile / tiles, row = tile % tiles / job.tiles_across, column = tile % job.tiles_across;
+    const TileCorner at{image, row * kSquare, column * kSquare};
     for (Dim c = 0; c < job.channels; c += Vec::kLanes) body(at, c, places + c);
   }
 }
@@ -234,27 +228,13 @@ ALWAYS_INLINE void place_tile(const PlacesJob& job, const real* v, const real* u
   }
 }
 
-template <int P>
-ALWAYS_INLINE void place_tiles(const PlacesJob& job, Dim& tile, const real* v, const real* u, real* m) {
-  for (; tile + P <= job.tiles; tile += P) {
-    Dim channel = 0;
-    for (; channel + 2 * Vec::kLanes <= job.cout; channel += 2 * Vec::kLanes) {
-      place_tile<P, 2>(job, v + tile * job.cin, u + channel, m + tile * job.cout + channel);
-    }
-    for (; channel < job.cout; channel += Vec::kLanes) {
-      place_tile<P, 1>(job, v + tile * job.cin, u + channel, m + tile * job.cout + channel);
-    }
-  }
-}
-
 void places(const PlacesJob& job, const real* v, const real* u, real* m) {
   const Dim v_step = place_step(job.tiles, job.cin), m_step = place_step(job.tiles, job.cout);
-  for (Dim i = 0; i < job.places; ++i) {
-    Dim tile = 0;
-    place_tiles<kTilePixels>(job, tile, v, u, m);
-    if constexpr (kTilePixels > 4) place_tiles<4>(job, tile, v, u, m);
-    place_tiles<2>(job, tile, v, u, m);
-    place_tiles<1>(job, tile, v, u, m);
-    v += v_step, u += job.place, m += m_step;
+  for (Dim i = 0; i < job.places; ++i, v += v_step, u += job.place, m += m_step) {
+    in_tiles<kTilePixels, 4, 2, 1>(job.tiles, [&]<int P>(Dim tile) INLINED {
+      in_vectors<2>(job.cout, [&]<int J, bool>(Dim channel) INLINED {
+        place_tile<P, J>(job, v + tile * job.cin, u + channel, m + tile * job.cout + channel);
+      });
+    });
   }
 }
