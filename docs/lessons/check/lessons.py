@@ -3,7 +3,7 @@
 
     lessons.py stubs                          writes the pieces with their holes (holes.txt) to yours/, where there are none
     lessons.py engine N PIECE OUT [--mine]    writes OUT: pieces 1 to N - 1 of the file, or of the reader, and PIECE
-    lessons.py prove CXX ARCHIVE [N ...]      every stub fails and names an entry, every solution passes, and each
+    lessons.py prove CXX [N ...]              every stub fails and names an entry, every solution passes, and each
                                               mistake of planted.txt is found and named; of lessons N only. What
                                               the README shows of a stub is what it says
 """
@@ -57,7 +57,7 @@ def engine(n, piece, out, mine=False):
     pathlib.Path(out).write_text("#pragma once\n" + text)
 
 
-def build(n, variants, compiler, archive, folder):
+def build(n, variants, compiler, folder):
     """One program for lesson n that checks the k-th variant of its piece when it is called with k."""
     text = (HERE / "check.cpp").read_text()
     head = "".join(line + "\n" for line in (MINI + text).splitlines() if line.startswith("#include <"))
@@ -78,7 +78,7 @@ int main(int, char** arguments) {{
     stem = pathlib.Path(folder) / f"lesson{n}"
     stem.with_suffix(".cpp").write_text(out)
     subprocess.run([compiler, "-std=c++20", "-O0", "-w", "-D_GLIBCXX_ASSERTIONS",
-                    f"-DLESSON={n}", f"-I{ROOT}", f"{stem}.cpp", archive, "-o", stem], check=True)
+                    f"-DLESSON={n}", f"-I{ROOT}", f"{stem}.cpp", "-o", stem], check=True)
     return stem
 
 
@@ -94,7 +94,7 @@ def quoted(n):
     return " ".join(found.group(1).split()) if found else ""
 
 
-def prove(compiler, archive, *only):
+def prove(compiler, *only):
     solutions, jobs = pieces(), {}
     for n, solution in enumerate(solutions, 1):
         if only and str(n) not in only:
@@ -109,7 +109,7 @@ def prove(compiler, archive, *only):
         jobs[n].append((f"'{new}'", solutions[n - 1].replace(old, new, 1), 1, expected))
 
     def prove_lesson(n):
-        program = build(n, [text for _, text, _, _ in jobs[n]], compiler, archive, folder)
+        program = build(n, [text for _, text, _, _ in jobs[n]], compiler, folder)
         done = []
         for k, (name, _, code, expected) in enumerate(jobs[n]):
             ran = subprocess.run([program, str(k)], capture_output=True, text=True, timeout=600)
@@ -134,7 +134,7 @@ if __name__ == "__main__":
         engine(int(sys.argv[2]), sys.argv[3], sys.argv[4], sys.argv[5:] == ["--mine"])
     elif sys.argv[1:] == ["stubs"]:
         write_stubs()
-    elif len(sys.argv) >= 4 and sys.argv[1] == "prove":
+    elif len(sys.argv) >= 3 and sys.argv[1] == "prove":
         sys.exit(prove(*sys.argv[2:]))
     else:
         sys.exit(__doc__)
