@@ -4,7 +4,6 @@
 #include <bit>
 #include <cctype>
 #include <cmath>
-#include <map>
 #include <set>
 #include <stdexcept>
 
@@ -39,55 +38,34 @@ std::string define(const std::string& name, const std::string& value, const std:
   return "#define " + name + " " + value + (about.empty() ? "" : " /* " + about + " */") + "\n";
 }
 
-class Writer {
- public:
-  explicit Writer(const IntegerPlan& plan) : plan_(plan) {}
+std::string at(int i) { return "&maps[" + std::to_string(i) + "]"; }
 
-  std::string maps() const;
-  std::string products();
-  std::string draw() const;
-  std::size_t weights() const { return weights_; }  // bytes
-
- private:
-  static std::string at(int i) { return "&maps[" + std::to_string(i) + "]"; }
-  std::string shape_of(int i) const;
-  std::string product(const IntegerStep& s, const std::string& name);
-  std::string call_of(const IntegerStep& s) const;
-
-  const IntegerPlan& plan_;
-  std::map<const IntegerStep*, std::string> names_;
-  std::size_t weights_ = 0;
-};
-
-std::string Writer::shape_of(int i) const {
-  const IntegerMap& m = plan_.map(i);
+std::string shape_of(const IntegerMap& m) {
   return (m.height > 1 ? "[" + text(m.height) + "]" : "") +
          (m.height * m.width > 1 ? "[" + text(m.width) + "]" : "") + "[" + text(m.channels) + "] " +
          (m.bytes ? "bytes" : "numbers");
 }
 
-std::string Writer::maps() const {
+std::string maps_of(const IntegerPlan& plan) {
   std::string out = "static const struct map maps[] = {\n";
-  for (std::size_t i = 0; i < plan_.maps.size(); ++i) {
-    const IntegerMap& m = plan_.maps[i];
-    const auto writer = std::ranges::find(plan_.steps, static_cast<int>(i),
+  for (std::size_t i = 0; i < plan.maps.size(); ++i) {
+    const IntegerMap& m = plan.maps[i];
+    const auto writer = std::ranges::find(plan.steps, static_cast<int>(i),
                                           [](const IntegerStep& s) { return s.maps.back(); });
     out += "    {" +
            list({m.offset, m.height, m.width, m.channels, m.margin_h, m.margin_w, m.bytes ? 1 : 0,
                  m.bytes ? m.scale.zero : 0}) +
-           "}, /* " + std::to_string(i) + ": " + writer->name + ", " + shape_of(static_cast<int>(i)) +
-           " */\n";
+           "}, /* " + std::to_string(i) + ": " + writer->name + ", " + shape_of(m) + " */\n";
   }
   return out + "};\n";
 }
 
-std::string Writer::product(const IntegerStep& s, const std::string& name) {
-  const bool bytes = plan_.map(s.maps[0]).bytes;
+std::string product_of(const IntegerPlan& plan, const IntegerStep& s, const std::string& name) {
+  const bool bytes = plan.map(s.maps[0]).bytes;
   const std::vector<std::uint8_t>& w = s.packed;
   const QuantisedProduct& q = s.weights;
-  weights_ += w.size() + 8 * q.offset.size();
-  std::string out = "/* " + s.name + ": " + shape_of(s.maps[0]) + " -> " + shape_of(s.maps[1]) + ", " +
-                    text(q.rows) + " weights an output */\n";
+  std::string out = "/* " + s.name + ": " + shape_of(plan.map(s.maps[0])) + " -> " +
+                    shape_of(plan.map(s.maps[1])) + ", " + text(q.rows) + " weights an output */\n";
   constexpr std::size_t kPerLine = 24;
   out += std::string(bytes ? "static const uint8_t " : "static const int8_t ") + name + "_weights[" +
          std::to_string(w.size()) + "] = {";
@@ -107,43 +85,34 @@ std::string Writer::product(const IntegerStep& s, const std::string& name) {
   return out;
 }
 
-std::string Writer::products() {
-  std::string out;
+// The products, and the function that calls them and all else.
+std::string network_of(const IntegerPlan& plan) {
+  std::string products, calls;
   std::set<std::string> taken;
-  for (const IntegerStep& s : plan_.steps) {
-    if (s.packed.empty()) continue;
-    const std::string whole = "NAME_" + replaced(s.name, ".", "_");
-    std::string name = whole;
-    for (int part = 1; !taken.insert(name).second; ++part) name = whole + "_" + std::to_string(part);
-    names_[&s] = name;
-    out += product(s, name);
+  for (const IntegerStep& s : plan.steps) {
+    std::vector<std::string> arguments;
+    if (s.function == "take_input") arguments.emplace_back("from");
+    if (!s.packed.empty()) {
+      const std::string whole = "NAME_" + replaced(s.name, ".", "_");
+      std::string name = whole;
+      for (int part = 1; !taken.insert(name).second; ++part) name = whole + "_" + std::to_string(part);
+      products += product_of(plan, s, name);
+      arguments.push_back("&" + name);
+    }
+    for (const int map : s.maps) arguments.push_back(map < 0 ? "0" : at(map));
+    for (const std::int32_t number : s.numbers) arguments.push_back(std::to_string(number));
+    if (s.writes_margin) calls += "  fill_margin(" + at(s.maps.back()) + ");\n";
+    calls += "  " + s.function + "(" + joined(arguments, ", ") + "); /* " + s.name + " */\n";
   }
-  return out;
-}
-
-std::string Writer::call_of(const IntegerStep& s) const {
-  std::vector<std::string> arguments;
-  if (s.function == "take_input") arguments.emplace_back("from");
-  if (!s.packed.empty()) arguments.push_back("&" + names_.at(&s));
-  for (const int map : s.maps) arguments.push_back(map < 0 ? "0" : at(map));
-  for (const std::int32_t number : s.numbers) arguments.push_back(std::to_string(number));
-  return s.function + "(" + joined(arguments, ", ") + ")";
-}
-
-std::string Writer::draw() const {
-  std::string out =
-      "void NAME_draw(const float from[TIMESTEPS * SIGNALS], float picture[PIXELS], float "
-      "predicted_error[PIXELS]) {\n";
-  for (const IntegerStep& s : plan_.steps) {
-    if (s.writes_margin) out += "  fill_margin(" + at(s.maps.back()) + ");\n";
-    out += "  " + call_of(s) + "; /* " + s.name + " */\n";
-  }
-  out += "  give(" + at(plan_.picture) + ", picture);\n";
-  if (plan_.predicted_error >= 0)
-    out += "  if (predicted_error) give(" + at(plan_.predicted_error) + ", predicted_error);\n";
+  calls += "  give(" + at(plan.picture) + ", picture);\n";
+  if (plan.predicted_error >= 0)
+    calls += "  if (predicted_error) give(" + at(plan.predicted_error) + ", predicted_error);\n";
   else
-    out += "  (void)predicted_error; /* the model predicts none */\n";
-  return out + "}\n\n";
+    calls += "  (void)predicted_error; /* the model predicts none */\n";
+  return products +
+         "void NAME_draw(const float from[TIMESTEPS * SIGNALS], float picture[PIXELS], float "
+         "predicted_error[PIXELS]) {\n" +
+         calls + "}\n\n";
 }
 
 // Enough for one window, and one more that is refused.
@@ -301,9 +270,9 @@ CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz
                 std::vector<ChainLink> chain) {
   check(name, sensor_hz);
   const auto plan = IntegerPlan::of(*file.model, file.int8_ranges());
-  Writer writer(*plan);
+  std::size_t weights = 0;  // bytes
+  for (const IntegerStep& s : plan->steps) weights += s.packed.size() + 8 * s.weights.offset.size();
   const std::string top = "/* " + name + ": tactile super-resolution, written by supertac-export";
-  const std::string products = writer.products();
   const std::string body =
       define("SIGNALS", "UPPER_SIGNALS") + define("TIMESTEPS", "UPPER_TIMESTEPS") +
       define("PIXELS", "(UPPER_HEIGHT * UPPER_WIDTH)") + define("WORK_BYTES", "UPPER_WORK_BYTES") +
@@ -311,8 +280,8 @@ CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz
       window_constants(file, sensor_hz) +
       "\nunion work_area {\n  int32_t aligned;\n  uint8_t bytes[WORK_BYTES];\n};\nstatic union work_area "
       "work;\n" +
-      define("WORK", "work.bytes") + "\n" + kKernels + "\n/* ---- The network. ---- */\n\n" + writer.maps() +
-      "\n" + products + writer.draw() + kWindow;
+      define("WORK", "work.bytes") + "\n" + kKernels + "\n/* ---- The network. ---- */\n\n" + maps_of(*plan) +
+      "\n" + network_of(*plan) + kWindow;
   const Privacy names = privacy_of(body);
   std::string upper = name;
   std::ranges::transform(upper, upper.begin(), [](unsigned char c) { return std::toupper(c); });
@@ -320,15 +289,14 @@ CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz
     return replaced(replaced(replaced(in, "NAME.h", name + ".h"), "NAME_", name + "_"), "UPPER_",
                     upper + "_");
   };
-  CCode code{{}, {}, std::move(chain), writer.weights(), static_cast<std::size_t>(plan->work_area)};
+  CCode code{{}, {}, std::move(chain), weights, static_cast<std::size_t>(plan->work_area)};
   code.source = named(top + ". */\n#include \"NAME.h\"\n\n#include <string.h>\n\n" + kBegin + names.before +
                       "\n" + body + "\n" + names.after + kEnd);
   code.chain.push_back({"code", sha256(code.source)});
   std::string made_of = top + ", of what these SHA-256 name (supertac-check chain):\n";
   for (const ChainLink& link : code.chain) made_of += "   " + left_aligned(link.name, 11) + link.hash + "\n";
   code.chain.push_back({"picture", self_test_hash(file, sensor_hz)});
-  code.header =
-      named(header_of(file, *plan, writer.weights(), sensor_hz, code.chain.back().hash, made_of + "*/\n"));
+  code.header = named(header_of(file, *plan, weights, sensor_hz, code.chain.back().hash, made_of + "*/\n"));
   return code;
 }
 
