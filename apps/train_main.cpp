@@ -30,10 +30,8 @@ void declare(Arguments& a) {
 namespace {
 
 void check_agreement(const Trainer& trainer, const TrainingTask& task, Ranks& ranks) {
-  std::map<std::string, std::string> mine = task.origin;
+  std::map<std::string, std::string> mine = trainer.metadata(task.origin);
   mine["build"] = version() + " " + commit();
-  mine["training"] = trainer.objective().text();
-  mine["model"] = trainer.objective().metadata().at("settings");
   mine["step"] = std::to_string(trainer.step());
   if (const auto odd = find_disagreement(ranks, mine))
     throw RanksError("rank " + std::to_string(odd->rank) + ": its " + odd->entry + " is " + odd->its +
@@ -44,7 +42,7 @@ void check_agreement(const Trainer& trainer, const TrainingTask& task, Ranks& ra
 
 // Restored before the run folder is touched: a checkpoint that does not fit must leave the folder as it was.
 Trainer make_trainer(TrainingTask& task, const std::string& resume, Ranks& ranks) {
-  Trainer trainer(*task.windows, task.split.train, std::move(task.objective), ranks);
+  Trainer trainer(*task.windows, task.split.train, task.recipe, ranks);
   if (!resume.empty()) trainer.restore(resume, task.origin);
   if (ranks.size() > 1) check_agreement(trainer, task, ranks);
   return trainer;
@@ -52,11 +50,12 @@ Trainer make_trainer(TrainingTask& task, const std::string& resume, Ranks& ranks
 
 nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, const TrainingTask& task) {
   using Json = nlohmann::ordered_json;
+  const auto said = trainer.metadata({});
   return {{"command", a.command_line()},
           {"version", version()},
           {"commit", commit()},
-          {"training", Json::parse(trainer.objective().text())},
-          {"model", Json::parse(trainer.objective().metadata().at("settings"))},
+          {"training", Json::parse(said.at("training"))},
+          {"model", Json::parse(said.at("settings"))},
           {"parameters", trainer.model().parameter_count()},
           {"split", task.origin.at("split")},
           {"train_windows", task.split.train.size()},
@@ -168,14 +167,13 @@ class TrainingRun {
   }
 
   void warn_of_collapse(const StepReport& report) {
-    const bool idle = trainer_.objective().latents() > 0 && report.active_latents == 0;
+    const bool idle = trainer_.recipe().model.latents() > 0 && report.active_latents == 0;
     const std::string advice =
         idle ? "no latent number tells windows apart; if that stays so, lower --beta (now " +
-                   format(trainer_.objective().recipe().loss.beta) + ") or "
+                   format(trainer_.recipe().loss.beta) + ") or "
              : "the pictures are the same for every input, or far too strong; if that stays so, lower ";
     a_.note("step " + std::to_string(report.step) + ": " + advice + "--learning-rate (now " +
-            format(trainer_.objective().recipe().learning_rate) +
-            "); early in a run it often mends itself: watch SSIM");
+            format(trainer_.recipe().learning_rate) + "); early in a run it often mends itself: watch SSIM");
   }
 
   const Arguments& a_;

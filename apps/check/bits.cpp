@@ -42,7 +42,7 @@ Bits bits_here() {
   settings.augment = kStandardAugmentation;
   std::vector<std::uint32_t> all(windows.size());
   for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-  Trainer trainer(windows, all, Objective(windows, settings));
+  Trainer trainer(windows, all, settings);
   for (int step = 0; step < 10; ++step) trainer.train_step();
   Sha256 training;
   trainer.for_each_tensor(

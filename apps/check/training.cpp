@@ -52,7 +52,7 @@ class Repetition {
       : folder_(RunFolder::folder_of(model)),
         ledger_(Ledger::read(LedgerFile::path_in(folder_))),
         task_(task_of(a, model)) {
-    trainer_.emplace(*task_.windows, task_.split.train, std::move(task_.objective));
+    trainer_.emplace(*task_.windows, task_.split.train, task_.recipe);
   }
 
   struct Segment {

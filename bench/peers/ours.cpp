@@ -166,7 +166,7 @@ class Ours {
       settings.epochs = 100'000;
       std::vector<std::uint32_t> all(data_->size());
       std::iota(all.begin(), all.end(), 0U);
-      trainer = std::make_unique<Trainer>(*data_, std::move(all), Objective(*data_, settings));
+      trainer = std::make_unique<Trainer>(*data_, std::move(all), settings);
     }
     return *trainer;
   }

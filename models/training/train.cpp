@@ -149,11 +149,11 @@ TrainingTask window_task(const Recipe& given, const RecordingFolders& folders) {
   const auto windows = std::make_shared<const WindowSet>(windows_of(given, folders, notes));
   Recipe recipe = given;
   set_array(recipe.model, windows->array());
-  TrainingTask task{.windows = windows, .objective = Objective(*windows, recipe)};
+  TrainingTask task{.windows = windows, .recipe = recipe};
   task.split = split_of(*windows, recipe, task.held_out);
   task.split.train = subsample_no_contact(*windows, std::move(task.split.train));
   task.origin = metadata_of(recipe);
-  task.origin.erase("training");  // the objective says it
+  task.origin.erase("training");  // the trainer says it
   task.origin["data"] = windows->fingerprint();
   task.origin["split_fingerprint"] = fingerprint(task.split);
   task.finds_interval_factor = recipe.split == SplitKind::group && !recipe.interval_factor;
@@ -246,8 +246,8 @@ void save_trained(const Trainer& trainer, const std::string& path,
 bool train(const Recipe& recipe, const RecordingFolders& folders, const std::string& out,
            const TrainingCallbacks& callbacks) {
   check_output(out);
-  TrainingTask task = window_task(recipe, folders);
-  Trainer trainer(*task.windows, task.split.train, std::move(task.objective));
+  const TrainingTask task = window_task(recipe, folders);
+  Trainer trainer(*task.windows, task.split.train, task.recipe);
   if (!callbacks.checkpoint.empty() && std::filesystem::exists(callbacks.checkpoint))
     trainer.restore(callbacks.checkpoint, task.origin);
   if (!train(trainer, task, callbacks)) return false;

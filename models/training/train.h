@@ -28,7 +28,7 @@ struct TrainingTask {
   /// Neither trained on nor tested: what the best epoch is chosen by (Recipe::keeps_best). Empty: the last is
   /// kept.
   std::vector<std::uint32_t> held_out = {};
-  Objective objective;
+  Recipe recipe = {};  ///< with the array of the windows
   /// What the model file says of its origin; the same whatever machine, folder or number of threads.
   std::map<std::string, std::string> origin = {};
   std::string counts = {};                ///< where the frames of the recordings went, for people

@@ -28,6 +28,8 @@ const Recipe& checked(const Recipe& recipe, const TaxelArray& array) {
   return recipe;
 }
 
+SuperTac network_of(const SuperTacSettings& settings, Rng rng) { return SuperTac(settings, rng); }
+
 constexpr Dim kTreeBlock = 1024;  // so that what the tree adds up on its way stays in the first cache
 
 // The left half of the tree is a whole one: as many parts as the largest power of two below their number.
@@ -61,73 +63,41 @@ void add_as_tree(Dim n, std::span<const real* const> parts, real* y) {
 
 }  // namespace
 
-Objective::Objective(const WindowSet& windows, const Recipe& recipe)
-    : Objective(checked(recipe, windows.array()), input_of(windows), windows.array(), Rng(recipe.seed)) {}
-
-Objective::Objective(const Recipe& recipe, const InputSettings& input, const TaxelArray& array, Rng rng)
-    : recipe_(recipe), input_(input), array_(array), model_(recipe.model, rng) {}
-
-BatchOutput Objective::operator()(const Batch& batch) const {
-  const SuperTac::Output drawn = model_.forward(batch.inputs, eps_of(batch).span());
-  BatchOutput output{supertac_loss(drawn, batch.targets, recipe_.loss), drawn.picture,
-                     PerGroup<Variable>(recipe_.model.groups())};
-  for (std::size_t g = 0; g < output.means.size(); ++g) output.means[g] = drawn.latent[g].mean;
-  return output;
-}
-
-// A group's columns of the noise; zeros without sampling.
-PerGroup<Tensor> Objective::eps_of(const Batch& batch) const {
-  const Dim samples = batch.inputs.dim(0), latent = recipe_.model.latent;
-  PerGroup<Tensor> eps(recipe_.model.groups());
-  for (std::size_t g = 0; g < eps.size(); ++g) {
-    eps[g] = Tensor::zeros(Shape{samples, latent});
-    for (Dim n = 0; recipe_.sampling && n < samples; ++n) {
-      const real* from = batch.noise.data() + n * latents() + static_cast<Dim>(g) * latent;
-      std::copy_n(from, latent, eps[g].data() + n * latent);
-    }
-  }
-  return eps;
-}
-
-void Objective::augment(std::uint64_t sample, std::span<float> window) const {
-  if (recipe_.augment.any()) supertac::augment(recipe_.augment, recipe_.seed, sample, window, array_);
-}
-
-Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Objective objective,
+Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const Recipe& recipe,
                  Ranks& ranks)
     : windows_(windows),
-      objective_(std::move(objective)),
-      batching_(std::move(train), static_cast<std::size_t>(objective_.recipe().batch),
-                objective_.recipe().seed),
-      adam_(values_of(model().parameters()), {.learning_rate = objective_.recipe().learning_rate,
-                                              .clip_norm = objective_.recipe().clip_norm,
-                                              .muon = objective_.recipe().muon}),
-      schedule_{.peak = objective_.recipe().learning_rate,
-                .warm_up = static_cast<std::int64_t>(
-                    objective_.recipe().warm_up *
-                    static_cast<double>(objective_.recipe().epochs * steps_per_epoch())),
-                .total = objective_.recipe().epochs * steps_per_epoch()},
+      recipe_(checked(recipe, windows.array())),
+      input_(input_of(windows)),
+      model_(network_of(recipe_.model, Rng(recipe_.seed))),
+      batching_(std::move(train), static_cast<std::size_t>(recipe_.batch), recipe_.seed),
+      adam_(values_of(model_.parameters()),
+            {.learning_rate = recipe_.learning_rate, .clip_norm = recipe_.clip_norm, .muon = recipe_.muon}),
+      schedule_{.peak = recipe_.learning_rate,
+                .warm_up = static_cast<std::int64_t>(recipe_.warm_up *
+                                                     static_cast<double>(recipe_.epochs * steps_per_epoch())),
+                .total = recipe_.epochs * steps_per_epoch()},
       ranks_(ranks) {
-  check_format(windows, model());
+  check_format(windows, model_);
   indices_.resize(batching_.batch_size());
   check_micro_batches(ranks.size(), indices_.size());
   const Dim n = static_cast<Dim>(indices_.size()),
             micro_batches = static_cast<Dim>(micro_batches_of(indices_.size()));
   const Dim first = micro_batches * ranks.rank() / ranks.size();
+  const Dim noise = recipe_.sampling ? recipe_.model.latents() : 0;
   for (Dim i = first; i < first + micro_batches / ranks.size(); ++i)
-    micro_batches_.emplace_back(objective_, i * n / micro_batches,
+    micro_batches_.emplace_back(model_, noise, i * n / micro_batches,
                                 (i + 1) * n / micro_batches - i * n / micro_batches);
   for (const MicroBatch& micro_batch : micro_batches_)
-    micro_batch_parameters_.push_back(&micro_batch.objective.network().parameters());
+    micro_batch_parameters_.push_back(&micro_batch.network.parameters());
 }
 
-Trainer::MicroBatch::MicroBatch(const Objective& master, Dim first_sample, Dim count)
+Trainer::MicroBatch::MicroBatch(const SuperTac& master, Dim noise, Dim first_sample, Dim count)
     : first(first_sample),
-      objective(master.clone()),
-      batch{Tensor(master.network().input_shape(count)), Tensor(master.network().picture_shape(count)), {}},
+      network(network_of(master.settings(), Rng::zeros())),
+      batch{Tensor(master.input_shape(count)), Tensor(master.picture_shape(count)), {}},
       statistics(master) {
-  if (master.noise() > 0) batch.noise = Tensor(Shape{count, master.noise()});
-  const auto &of_master = master.network().parameters(), &own = objective.network().parameters();
+  if (noise > 0) batch.noise = Tensor(Shape{count, noise});
+  const auto &of_master = master.parameters(), &own = network.parameters();
   for (std::size_t i = 0; i < own.size(); ++i)
     Variable(own[i].value).mutable_value() = of_master[i].value.value();  // the same buffer
 }
@@ -149,43 +119,63 @@ void Trainer::fill(MicroBatch& micro_batch) const {
     const std::span<float> target =  // [H,W,1]
         micro_batch.batch.targets.values().subspan(n * target_size, target_size);
     windows_.truth(indices_[slot], target);
-    if (windows_.augmentable(indices_[slot])) objective_.augment(batching_.sample(epoch, b, slot), input);
+    if (recipe_.augment.any() && windows_.augmentable(indices_[slot]))
+      augment(recipe_.augment, recipe_.seed, batching_.sample(epoch, b, slot), input, windows_.array());
   }
 }
 
 // The numbers of sample i of step s do not depend on how the batch is cut.
 void Trainer::draw_noise(MicroBatch& micro_batch) const {
-  const RandomStream random(objective_.recipe().seed, kNoiseStream);
-  const auto numbers = static_cast<std::uint64_t>(objective_.noise());
-  if (numbers == 0) return;
+  if (!micro_batch.batch.noise.defined()) return;
+  const RandomStream random(recipe_.seed, kNoiseStream);
+  const auto numbers = static_cast<std::uint64_t>(micro_batch.batch.noise.dim(1));
   std::uint64_t next =
       (static_cast<std::uint64_t>(step()) * indices_.size() + static_cast<std::uint64_t>(micro_batch.first)) *
       numbers;
   for (real& value : micro_batch.batch.noise.values()) value = static_cast<real>(random.normal(next++));
 }
 
+// A group's columns of the noise; zeros without sampling.
+PerGroup<Tensor> Trainer::eps_of(const Batch& batch) const {
+  const Dim samples = batch.inputs.dim(0), latent = recipe_.model.latent;
+  PerGroup<Tensor> eps(recipe_.model.groups());
+  for (std::size_t g = 0; g < eps.size(); ++g) {
+    eps[g] = Tensor::zeros(Shape{samples, latent});
+    for (Dim n = 0; batch.noise.defined() && n < samples; ++n) {
+      const real* from = batch.noise.data() + n * batch.noise.dim(1) + static_cast<Dim>(g) * latent;
+      std::copy_n(from, latent, eps[g].data() + n * latent);
+    }
+  }
+  return eps;
+}
+
 // Goes forward, through the loss and backward for one micro-batch; its share of the batch weighs each term.
 void Trainer::run(MicroBatch& micro_batch) const {
-  const std::vector<Parameter>& parameters = micro_batch.objective.network().parameters();
+  const std::vector<Parameter>& parameters = micro_batch.network.parameters();
   fill(micro_batch);
   draw_noise(micro_batch);
   for (const Parameter& p : parameters) Variable(p.value).drop_grad();  // backward() sets the next ones
-  const BatchOutput output = micro_batch.objective(micro_batch.batch);
-  const double share =
-      static_cast<double>(micro_batch.batch.inputs.dim(0)) / static_cast<double>(indices_.size());
-  LossTerms terms = terms_of(output.loss, share);
   Statistics& statistics = micro_batch.statistics;
   std::ranges::fill(statistics.values, 0);
-  std::ranges::transform(terms.all(), statistics.terms().begin(), [](const double* term) { return *term; });
-  statistics.pictures().add(output.picture.value());
   statistics.targets().add(micro_batch.batch.targets);
-  std::size_t first = 0;
-  for (const Variable& mean : output.means.span()) {  // [n,LD] of each group
-    statistics.means().add(mean.value(), first);
-    first += static_cast<std::size_t>(mean.dim(1));
+  Loss loss;
+  {  // what the loss does not need is free before the way back
+    const SuperTac::Output drawn =
+        micro_batch.network.forward(micro_batch.batch.inputs, eps_of(micro_batch.batch).span());
+    loss = supertac_loss(drawn, micro_batch.batch.targets, recipe_.loss);
+    statistics.pictures().add(drawn.picture.value());
+    std::size_t first = 0;
+    for (const LatentDistribution& latent : drawn.latent.span()) {  // [n,LD] of each group
+      statistics.means().add(latent.mean.value(), first);
+      first += static_cast<std::size_t>(latent.mean.dim(1));
+    }
   }
-  if (std::isfinite(terms.total)) return backward(static_cast<real>(share) * output.loss.total);
-  micro_batch.trouble = where_not_finite(output.loss.total, parameters);
+  const double share =
+      static_cast<double>(micro_batch.batch.inputs.dim(0)) / static_cast<double>(indices_.size());
+  LossTerms terms = terms_of(loss, share);
+  std::ranges::transform(terms.all(), statistics.terms().begin(), [](const double* term) { return *term; });
+  if (std::isfinite(terms.total)) return backward(static_cast<real>(share) * loss.total);
+  micro_batch.trouble = where_not_finite(loss.total, parameters);
 }
 
 void Trainer::batch_of(std::int64_t step, std::span<std::uint32_t> out) const {
@@ -205,7 +195,7 @@ StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMi
       if (!around) {
         run(micro_batch);
       } else {
-        around(i, {micro_batch.batch, *micro_batch_parameters_[i]}, [&] { run(micro_batch); });
+        around(i, micro_batch.batch, *micro_batch_parameters_[i], [&] { run(micro_batch); });
       }
     } catch (...) {  // an exception must not leave a thread
       micro_batches_[i].error = std::current_exception();
@@ -226,9 +216,9 @@ StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMi
   return report;
 }
 
-Trainer::Statistics::Statistics(const Objective& objective)
-    : pixels(static_cast<std::size_t>(objective.network().picture_shape(1).elements())),
-      values(6 + 4 * pixels + 2 * static_cast<std::size_t>(objective.latents())) {}
+Trainer::Statistics::Statistics(const SuperTac& network)
+    : pixels(static_cast<std::size_t>(network.picture_shape(1).elements())),
+      values(6 + 4 * pixels + 2 * static_cast<std::size_t>(network.settings().latents())) {}
 
 // Of micro-batches, then of processes, as balanced binary trees; Trainer::apply() adds the gradients.
 void Trainer::add_up_statistics(StepReport& report) {
@@ -265,7 +255,7 @@ void Trainer::look_for_collapse(StepReport& report) {
   if (indices_.size() < 2) return;  // nothing to compare with
   const auto samples = static_cast<double>(indices_.size());
   report.active_latents = active_latents(sums.means(), samples);
-  const bool idle = objective_.latents() > 0 && report.active_latents == 0;
+  const bool idle = recipe_.model.latents() > 0 && report.active_latents == 0;
   const bool flat = idle || is_degenerate(sums.pictures(), sums.targets(), samples);
   flat_steps_ = flat && step_ >= schedule_.warm_up ? flat_steps_ + 1 : 0;
   report.collapsed = flat_steps_ >= kFlatStepsToReport;
@@ -319,8 +309,8 @@ double Trainer::apply() {
 // Of a model file and of a saved state: the caller's, the network's and the training's, in which a state that
 // is resumed must agree.
 std::map<std::string, std::string> Trainer::metadata(std::map<std::string, std::string> origin) const {
-  origin.merge(objective_.metadata());
-  origin["training"] = objective_.text();
+  origin.merge(model_metadata(recipe_.model, input_));
+  origin["training"] = training_text(recipe_);
   return origin;
 }
 

@@ -1,7 +1,6 @@
-// Training of a network, one visible step at a time: what it is trained on (Objective), and who trains it
-// (Trainer).
+// Training of a network, one visible step at a time.
 //
-//   Trainer trainer(windows, split.train, Objective(windows, recipe));
+//   Trainer trainer(windows, split.train, recipe);
 //   while (!trainer.done()) report(trainer.train_step());
 //
 // Every random choice is a function of (seed, step), so that a restored trainer continues to the same bits.
@@ -36,47 +35,8 @@ namespace supertac {
 /// One batch, or a micro-batch's share of it.
 struct Batch {
   Tensor inputs, targets;  ///< as SuperTac::input_shape() and picture_shape() have it
-  /// [N,Objective::noise()], ~ N(0,1), LD columns a group; undefined without sampling: z = mean.
+  /// [N,G LD], ~ N(0,1), LD columns a group; undefined without sampling: z = mean.
   Tensor noise;
-};
-
-/// Of a batch: the loss, and what tells a collapse (models/training/loss/collapse.h).
-struct BatchOutput {
-  Loss loss;
-  Variable picture;
-  PerGroup<Variable> means;  ///< of the latents, [N,LD] each; none for a network without latents
-};
-
-/// supertac_loss() of a recipe's network over windows that are augmented before.
-class Objective {
- public:
-  /// For windows of this format. Throws std::invalid_argument naming the setting of the recipe.
-  Objective(const WindowSet& windows, const Recipe& recipe);
-  const SuperTac& network() const { return model_; }
-  const Recipe& recipe() const { return recipe_; }
-  /// The same with a network of its own, not yet with this one's values.
-  Objective clone() const { return {recipe_, input_, array_, Rng::zeros()}; }
-
-  BatchOutput operator()(const Batch& batch) const;
-  /// How many numbers of noise and of latents a sample has.
-  Dim noise() const { return recipe_.sampling ? latents() : 0; }
-  Dim latents() const { return recipe_.model.latents(); }
-  /// Augments a window in place; `sample` is its number since training began.
-  void augment(std::uint64_t sample, std::span<float> window) const;
-
-  /// Its settings as JSON text, to compare on resume.
-  std::string text() const { return training_text(recipe_); }
-  /// What the checkpoint says of the network and its input.
-  std::map<std::string, std::string> metadata() const { return model_metadata(recipe_.model, input_); }
-
- private:
-  Objective(const Recipe& recipe, const InputSettings& input, const TaxelArray& array, Rng rng);
-  PerGroup<Tensor> eps_of(const Batch& batch) const;
-
-  Recipe recipe_;
-  InputSettings input_;
-  TaxelArray array_;
-  SuperTac model_;
 };
 
 struct StepReport : LossTerms {
@@ -96,22 +56,19 @@ class TrainingStopped : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A micro-batch as observers of a step see it (models/training/audit/opened_step.h).
-struct MicroBatchView {
-  const Batch& batch;
-  const std::vector<Parameter>& parameters;  ///< the model's values under gradients of their own
-};
-/// Stands around each micro-batch of a step, on its thread: must call `run`, which fills the batch and goes
-/// forward and backward.
+/// Stands around each micro-batch of a step, on its thread (models/training/audit/opened_step.h): must call
+/// `run`, which fills the batch and goes forward and backward. `parameters`: the model's values under
+/// gradients of their own.
 using AroundMicroBatch =
-    std::function<void(std::size_t number, const MicroBatchView&, const std::function<void()>& run)>;
+    std::function<void(std::size_t number, const Batch& batch, const std::vector<Parameter>& parameters,
+                       const std::function<void()>& run)>;
 
 class Trainer {
  public:
-  /// `windows` and `ranks` must outlive the trainer. Throws std::invalid_argument for windows of another
-  /// format than the network's, no training window, or as check_micro_batches(). `ranks` train together: all
-  /// of them call train_step() and save().
-  Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Objective objective,
+  /// `windows` and `ranks` must outlive the trainer. Throws std::invalid_argument naming the setting of the
+  /// recipe, for windows of another format than the network's, no training window, or as
+  /// check_micro_batches(). `ranks` train together: all of them call train_step() and save().
+  Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const Recipe& recipe,
           Ranks& ranks = one_process());
 
   bool done() const { return step_ >= schedule_.total || epochs_since_best_ >= kPatience; }
@@ -126,8 +83,8 @@ class Trainer {
   void use_best();
   std::int64_t best_epoch() const { return best_epoch_; }  ///< from 1; 0: none was scored
   double best_score() const { return best_score_; }
-  const Objective& objective() const { return objective_; }
-  const SuperTac& model() const { return objective_.network(); }
+  const Recipe& recipe() const { return recipe_; }
+  const SuperTac& model() const { return model_; }
   const WindowSet& windows() const { return windows_; }
   /// The windows that are trained on.
   const std::vector<std::uint32_t>& training_side() const { return batching_.indices(); }
@@ -153,7 +110,7 @@ class Trainer {
   /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Of several
   /// processes only the first writes, after check_same(). Throws FileError.
   void save(const std::string& path, std::map<std::string, std::string> metadata) const;
-  /// `origin` with what the objective says of network, input and training.
+  /// `origin` with what there is to say of network, input and training.
   std::map<std::string, std::string> metadata(std::map<std::string, std::string> origin) const;
   /// Continues where the saved trainer stood. Throws std::runtime_error when the file holds no training
   /// state, or was made with other settings or data (naming the difference); nothing is changed then.
@@ -163,7 +120,7 @@ class Trainer {
   /// What micro-batches, then processes add up, in one piece: whether to stop, the terms of the loss, how
   /// pictures, truths and the latents' means vary.
   struct Statistics {
-    explicit Statistics(const Objective& objective);
+    explicit Statistics(const SuperTac& network);
     std::size_t pixels;
     std::vector<double> values;
     std::span<double> terms() { return std::span(values).subspan(1, 5); }
@@ -172,9 +129,9 @@ class Trainer {
     BatchVariance means() { return {std::span(values).subspan(6 + 4 * pixels)}; }
   };
   struct MicroBatch {
-    MicroBatch(const Objective& master, Dim first, Dim count);
-    Dim first;            // its share of the batch: samples first .. first + inputs.dim(0)
-    Objective objective;  // the master's values under gradients of its own
+    MicroBatch(const SuperTac& master, Dim noise, Dim first, Dim count);
+    Dim first;         // its share of the batch: samples first .. first + inputs.dim(0)
+    SuperTac network;  // the master's values under gradients of its own
     Batch batch;
     Statistics statistics;
     std::string trouble;  // where the loss stopped being finite
@@ -183,6 +140,7 @@ class Trainer {
   // These work on one micro-batch: take windows and truths, draw noise, go forward and backward.
   void fill(MicroBatch& micro_batch) const;
   void draw_noise(MicroBatch& micro_batch) const;
+  PerGroup<Tensor> eps_of(const Batch& batch) const;
   void run(MicroBatch& micro_batch) const;
   // Of all of them: the statistics, into the report, and what these say.
   void add_up_statistics(StepReport& report);
@@ -202,7 +160,9 @@ class Trainer {
   void add_up_over_ranks();
 
   const WindowSet& windows_;
-  Objective objective_;
+  Recipe recipe_;
+  InputSettings input_;
+  SuperTac model_;
   Batching batching_;
   mutable Adam adam_;
   Schedule schedule_;

@@ -22,7 +22,7 @@ class CollapseTest : public ::testing::Test {
     double difference = 0, decoded = 0;  // of two windows' pictures and decoded signals, root mean square
   };
   End train(const Recipe& s) {
-    Trainer trainer(windows, all_of(windows), Objective(windows, s));
+    Trainer trainer(windows, all_of(windows), s);
     StepReport report;
     try {
       while (!trainer.done() && !report.collapsed) report = trainer.train_step();

@@ -62,7 +62,7 @@ TEST_F(MemoryTest, OneTrainingStep) {
   const WindowSet windows = small_windows(settings_.model, 60);
   settings_.batch = 1;  // one micro-batch
   const auto step = [&] {
-    Trainer trainer(windows, all_of(windows), Objective(windows, settings_));
+    Trainer trainer(windows, all_of(windows), settings_);
     trainer.train_step();
   };
   expect_survival(step);

@@ -102,7 +102,7 @@ struct SmallTraining {
   Recipe recipe = small_training();
   WindowSet windows = small_windows(recipe.model);
 
-  Trainer trainer() const { return {windows, all_of(windows), Objective(windows, recipe)}; }
+  Trainer trainer() const { return {windows, all_of(windows), recipe}; }
 };
 
 inline std::string file_text(const std::string& path) {

@@ -133,7 +133,7 @@ std::vector<Json> states_of(const Trainer& trainer, Opening& opening) {
 void add_update(Json& operators, const Trainer& trainer, Opening& opening, const StepReport& report,
                 std::vector<Json> before, const std::vector<std::vector<std::string>>& gradients) {
   const std::vector<Parameter>& parameters = trainer.model().parameters();
-  const Recipe& recipe = trainer.objective().recipe();
+  const Recipe& recipe = trainer.recipe();
   const AdamOptions adam;
   const double norm = report.gradient_norm;
   Json sums = Json::array();
@@ -183,12 +183,13 @@ OpenedStep open_step(Trainer& trainer, const std::optional<std::string>& keep) {
   const std::vector<Json> before = states_of(trainer, opening);
   std::array<Json, kMostMicroBatches> operators;
   std::array<std::vector<std::string>, kMostMicroBatches> gradients;
-  const StepReport report =
-      trainer.train_step({}, [&](std::size_t number, const MicroBatchView& micro_batch, const auto& run) {
+  const StepReport report = trainer.train_step(
+      {},
+      [&](std::size_t number, const Batch& batch, const std::vector<Parameter>& parameters, const auto& run) {
         MicroBatchWatch watch(opening, number);
         run();
-        operators[number] = watch.operators(micro_batch.batch);
-        for (const Parameter& p : micro_batch.parameters)
+        operators[number] = watch.operators(batch);
+        for (const Parameter& p : parameters)
           gradients[number].push_back(opening.note("sum/" + p.name, p.value.grad()));
       });
   opened.operators.push_back({{"name", "batch"},

@@ -134,7 +134,7 @@ class RanksTrain : public testing::Test {
     small_.recipe.batch = 12;  // micro-batches of one and of two samples
   }
   Trainer trainer(Ranks& ranks) const {
-    return {small_.windows, all_of(small_.windows), Objective(small_.windows, small_.recipe), ranks};
+    return {small_.windows, all_of(small_.windows), small_.recipe, ranks};
   }
   /// From the state in `from` ("" = start) by `ranks` for `steps` steps; the state's file.
   std::string train(int size, const std::string& from, std::int64_t steps) {
