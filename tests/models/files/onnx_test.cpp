@@ -2,7 +2,6 @@
 #include "data/windows/transforms.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/hash.h"
-#include "models/files/onnx_file.h"
 #include "models/inference/compiled/compiled_model.h"
 #include "tests/models/support.h"
 #include "tests/support/test.h"
@@ -98,19 +97,6 @@ TEST(Onnx, TheGraphIsTheOneThatWasCompared) {
   hash.add(bytes);
   EXPECT_EQ(hash.hex(), "85e4f92e4e42cca0")
       << "compare again: SUPERTAC_PYTHON=... models_test --gtest_filter=Onnx.*";
-}
-
-// From the documentation of the wire format: 150 in field 1 is 08 96 01, "testing" in field 2 is 12 07 ...
-TEST(Onnx, TheWireFormatIsThatOfItsDocumentation) {
-  WireMessage message;
-  message.integer(1, 150);
-  message.bytes(2, "testing");
-  message.integer(3, -2);
-  message.number(4, 1.0F);
-  EXPECT_EQ(message.text(),
-            std::string("\x08\x96\x01\x12\x07testing\x18\xFE\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\x01"
-                        "\x25\x00\x00\x80\x3F",
-                        28));
 }
 
 }  // namespace supertac::onnx_test

@@ -130,28 +130,16 @@ TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
                  SuperTacSettings::of_preset("huge"));
 }
 
-TEST(TextureClassifier, TakesFramesAndPictures) {
+TEST(TextureClassifier, TakesFramesPicturesAndLatentsAndRefusesSettingsOutOfRange) {
   Rng rng(1);
-  EXPECT_EQ(TextureClassifier({.height = 4, .width = 4, .classes = 6}, rng)
-                .forward(Variable(uniform({2, 4, 4, 1}, 1)))
-                .shape(),
-            (Shape{2, 6}));
-  EXPECT_EQ(TextureClassifier({.height = 16, .width = 16, .classes = 3}, rng)
-                .forward(Variable(uniform({2, 16, 16, 1}, 1)))
-                .shape(),
-            (Shape{2, 3}));
-  EXPECT_EQ(TextureClassifier({.height = 1, .width = 1, .channels = 40, .classes = 4}, rng)
-                .forward(Variable(uniform({3, 1, 1, 40}, 1)))
-                .shape(),
-            (Shape{3, 4}));
-}
-
-TEST(TextureClassifier, RefusesSettingsOutOfRange) {
-  Rng rng(1);
-  EXPECT_REFUSAL("TextureClassifier: height expects 1 to 2048, got 0",
-                 TextureClassifier({.height = 0, .width = 4, .classes = 6}, rng));
+  for (const ClassifierSettings& s :
+       {ClassifierSettings{4, 4, 1, 6}, ClassifierSettings{16, 16, 1, 3}, ClassifierSettings{1, 1, 40, 4}})
+    EXPECT_EQ(
+        TextureClassifier(s, rng).forward(Variable(uniform({2, s.height, s.width, s.channels}, 1))).shape(),
+        (Shape{2, s.classes}));
+  EXPECT_REFUSAL("TextureClassifier: height expects 1 to 2048, got 0", TextureClassifier({.height = 0}, rng));
   EXPECT_REFUSAL("TextureClassifier: classes expects 2 to 1024, got 1",
-                 TextureClassifier({.height = 16, .width = 16, .classes = 1}, rng));
+                 TextureClassifier({.classes = 1}, rng));
 }
 
 }  // namespace supertac::supertac_model_test

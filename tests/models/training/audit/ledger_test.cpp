@@ -40,41 +40,24 @@ Ledger read(const std::string& text) {
 
 const std::vector<Entry> kRun = {{"x", "1", "2"}, {"y", "3", "4"}, {"z", "5", "6"}};
 
-/// Of the lines of a step in two ledgers.
-std::optional<LedgerDifference> difference_at(std::int64_t step, const Ledger& one, const Ledger& other) {
-  return difference(one, one.at(step).value(), other.at(step).value());
-}
-
-TEST(Ledger, AgreesWithItself) {
+TEST(Ledger, NamesTheStepAndTheFirstTensorThatDiffersOrTheBatches) {
   const Ledger run = read(ledger_of(kRun));
   EXPECT_EQ(run.every, 5);
   EXPECT_EQ(run.lines.size(), 3U);
-  for (const std::int64_t step : {5, 10, 15}) EXPECT_FALSE(difference_at(step, run, run));
   EXPECT_FALSE(run.at(7));
-}
-
-TEST(Ledger, NamesTheStepAndTheFirstTensorThatDiffers) {
-  const Ledger run = read(ledger_of(kRun));
-  for (std::size_t at = 0; at < kRun.size(); ++at) {
-    std::vector<Entry> changed = kRun;
-    changed[at].second += "0";
-    const auto found = difference_at(static_cast<std::int64_t>(5 * at + 5), run, read(ledger_of(changed)));
-    ASSERT_TRUE(found) << at;
-    EXPECT_EQ(found->step, static_cast<std::int64_t>(5 * at + 5));
-    EXPECT_EQ(found->after, static_cast<std::int64_t>(5 * at));
-    EXPECT_EQ(found->what, "b");
-    EXPECT_FALSE(found->batches);
-  }
-}
-
-TEST(Ledger, NamesTheBatchesWhereAllTensorsAreTheSame) {
-  std::vector<Entry> changed = kRun;
-  changed[1].batches = "w";
-  const auto found = difference_at(10, read(ledger_of(kRun)), read(ledger_of(changed)));
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->step, 10);
-  EXPECT_EQ(found->what, "the batches");
-  EXPECT_TRUE(found->batches);
+  for (std::size_t at = 0; at < kRun.size(); ++at)
+    for (const bool batches : {false, true}) {
+      const auto step = static_cast<std::int64_t>(5 * at + 5);
+      std::vector<Entry> changed = kRun;
+      (batches ? changed[at].batches : changed[at].second) += "0";
+      EXPECT_FALSE(difference(run, run.at(step).value(), run.at(step).value()));
+      const auto found = difference(run, run.at(step).value(), read(ledger_of(changed)).at(step).value());
+      ASSERT_TRUE(found) << at;
+      EXPECT_EQ(found->step, step);
+      EXPECT_EQ(found->after, step - 5);
+      EXPECT_EQ(found->what, batches ? "the batches" : "b");
+      EXPECT_EQ(found->batches, batches);
+    }
 }
 
 TEST(OpenedSteps, AreStepsLikeAnyOther) {
