@@ -11,7 +11,6 @@
 #include "data/windows/windows.h"
 #include "layers/checkpoint.h"
 #include "models/inference/compiled/compiled_model.h"
-#include "models/inference/compiled/ranges.h"
 #include "models/inference/interval.h"
 #include "models/inference/novelty.h"
 #include "models/networks/supertac_model.h"

@@ -12,14 +12,14 @@
 namespace supertac {
 namespace {
 
-using Ints = std::vector<std::int64_t>;
 using kernels::ConvSettings;
+using onnx::Ints;
 
 /// From a trace to nodes. Maps are channels-first here, [N,C,P...], as ONNX has them.
 class Exporter {
  public:
   std::string picture_of(const ModelFile& file);
-  OnnxGraph graph;
+  onnx::Graph graph;
 
  private:
   using Id = const detail::Node*;
@@ -50,15 +50,14 @@ class Exporter {
 
 std::string Exporter::number(float value) {
   const std::string name = "number_" + format(value);
-  if (written_.insert(name).second) graph.constant(name, {}, std::span(&value, 1));
+  if (written_.insert(name).second) graph.constant(name, {}, std::vector{value});
   return name;
 }
 
 std::string Exporter::numbers(const Ints& values) {
   std::string name = "numbers";
   for (const std::int64_t i : values) name += "_" + std::to_string(i);
-  const std::int64_t shape[] = {static_cast<std::int64_t>(values.size())};
-  if (written_.insert(name).second) graph.constant(name, shape, values);
+  if (written_.insert(name).second) graph.constant(name, {std::ssize(values)}, values);
   return name;
 }
 
@@ -82,8 +81,7 @@ void Exporter::bin_edges(const Scaling& scaling) {
     while (bin > 0 && scaling(v) >= least) v = std::nextafter(v, away);
     while (scaling(v) < least) v = std::nextafter(v, -away);
   }
-  const std::int64_t shape[] = {256};
-  graph.constant("bin_edges", shape, edges);
+  graph.constant("bin_edges", {256}, edges);
 }
 
 // Lower edge of the bin that holds the rank-th smallest sample of each signal, [N,1,signals]: the highest bin
@@ -125,7 +123,7 @@ std::string Exporter::normalised_per_window(const std::string& x, const Scaling&
 std::string Exporter::network_input(const ModelFile& file) {
   const SuperTacSettings& s = file.model->settings();
   graph.input(
-      "volts", Ints{s.timesteps, s.signals()},
+      "volts", {s.timesteps, s.signals()},
       "Volts of every signal, oldest sample first; taxel k lies in row k / columns, column k % columns.");
   const std::string x = scaled(file);
   return file.input.scaling.per_window ? normalised_per_window(x, file.input.scaling, s.timesteps) : x;
@@ -181,7 +179,6 @@ std::string Exporter::made(const TracedOp& op) {
   if (kind == "linear") return linear(op);
   if (kind == "gated_sum") return gated_sum(op);
   const std::string x = of(op.inputs[0]);
-  const Ints images = {-1};
   if (kind == "take_runs") {
     Ints columns;
     for (Dim k = 0; k < op.y.dim(2); ++k)
@@ -219,7 +216,7 @@ std::string Exporter::made(const TracedOp& op) {
 
 void Exporter::output(const char* name, const Variable& y, const char* about) {
   graph.node("Reshape", {of(y), numbers({-1, y.dim(1), y.dim(2)})}, name);
-  graph.output(name, Ints{y.dim(1), y.dim(2)}, about);
+  graph.output(name, {y.dim(1), y.dim(2)}, about);
 }
 
 std::string Exporter::picture_of(const ModelFile& file) {

@@ -12,7 +12,6 @@
 #include "data/windows/windows.h"
 #include "io/numbers/numbers.h"
 #include "layers/checkpoint.h"
-#include "models/inference/compiled/ranges.h"
 #include "models/inference/evaluation.h"
 #include "models/inference/novelty.h"
 
@@ -58,20 +57,17 @@ bool all_simulated(const WindowSet& windows) {
 }
 
 WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std::vector<std::string>& notes) {
-  const auto watch = [&](const std::string& folder) {
-    return folders.watch ? folders.watch(folder) : ReadingWatch();
-  };
   WindowSettings w;
   w.timesteps = static_cast<int>(recipe.model.timesteps);
   w.scale = static_cast<int>(recipe.model.scale);
   w.rate_hz = recipe.rate_hz;
   w.delay_s = recipe.delay_s;
   w.stride = static_cast<int>(recipe.stride);
-  const SignalRange range =
-      SignalRange::of_folder(folders.data, recipe.plates, watch(folders.data), recipe.range.has_value());
+  const SignalRange range = SignalRange::of_folder(folders.data, recipe.plates, folders.watch(folders.data),
+                                                   recipe.range.has_value());
   range.felt().check();
   w.scaling = scaling_of(recipe, range, notes);
-  WindowSet windows = WindowSet::load(folders.data, recipe.plates, w, watch(folders.data));
+  WindowSet windows = WindowSet::load(folders.data, recipe.plates, w, folders.watch(folders.data));
   const RandomPasses random{.count = static_cast<std::size_t>(recipe.random_plates),
                             .seed = recipe.seed,
                             .speed_mm_s = common_speed(windows),

@@ -18,8 +18,8 @@ namespace supertac {
 /// Where recordings lie.
 struct RecordingFolders {
   std::string data;
-  /// Gives the watch of a folder's reading; empty: none.
-  std::function<ReadingWatch(const std::string& folder)> watch = {};
+  /// Gives the watch of a folder's reading.
+  std::function<ReadingWatch(const std::string& folder)> watch = [](const auto&) { return ReadingWatch(); };
 };
 
 struct TrainingTask {

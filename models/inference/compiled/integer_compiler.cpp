@@ -29,17 +29,14 @@ struct Factor {
   double value() const { return std::ldexp(multiplier, -shift); }
 };
 
-Factor at_shift(double target, int shift) {
-  const double multiplier = std::clamp(std::ceil(std::ldexp(target, shift)), 1.0, 1048576.0);
-  return {static_cast<std::int32_t>(multiplier), shift};
-}
-
 Factor factor_of(double target, double bias_steps) {
   int exponent = 0, room = 0;
   std::frexp(target, &exponent);
   std::frexp(bias_steps, &room);  // the bias is shifted too
   const int most = std::clamp(kMostShift - 1 - room, kLeastShift, kMostShift);
-  return at_shift(target, std::clamp(kMultiplierBits - exponent, kLeastShift, most));
+  const int shift = std::clamp(kMultiplierBits - exponent, kLeastShift, most);
+  const double multiplier = std::clamp(std::ceil(std::ldexp(target, shift)), 1.0, 1048576.0);
+  return {static_cast<std::int32_t>(multiplier), shift};
 }
 
 // w [rows][outputs], bias [outputs].

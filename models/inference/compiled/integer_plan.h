@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "models/inference/compiled/compiled_model.h"
-#include "models/inference/compiled/ranges.h"
 #include "models/inference/compiled/taps.h"
 #include "models/networks/supertac_model.h"
 

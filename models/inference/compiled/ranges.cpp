@@ -1,10 +1,10 @@
-#include "models/inference/compiled/ranges.h"
-
+// The ranges of the results of a network's ops, from which int8 takes its scales.
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "io/numbers/numbers.h"
+#include "models/inference/compiled/compiled_model.h"
 
 namespace supertac {
 
