@@ -146,13 +146,9 @@ class Ours {
 
   std::string pictures(const std::string& path) {
     const Tensor pictures = compiled_.estimate(windows_).picture;
-    const auto height = static_cast<std::uint64_t>(model_->settings().image_height());
-    const auto width = static_cast<std::uint64_t>(model_->settings().image_width());
-    write_safetensors(path, {},
-                      {{"pictures",
-                        "F32",
-                        {static_cast<std::uint64_t>(windows_.dim(0)), height, width},
-                        std::as_bytes(pictures.values())}});
+    std::vector<std::uint64_t> shape;
+    for (int i = 0; i < 3; ++i) shape.push_back(static_cast<std::uint64_t>(pictures.dim(i)));
+    write_safetensors(path, {}, {{"pictures", "F32", shape, std::as_bytes(pictures.values())}});
     return "done";
   }
 

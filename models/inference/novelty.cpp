@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "autograd/kernels/fast/pool.h"
 #include "io/numbers/same_bits.h"
 #include "io/numbers/text.h"
 
@@ -56,8 +57,6 @@ Matrix inverse_of_lower(const Matrix& l, std::size_t d) {
 
 constexpr std::size_t kLeastFrames = 16, kFramesLookedAt = 64, kLagShare = 8;
 constexpr double kStillest = 0.0005, kLeastSwing = 0.003;
-constexpr std::size_t kSumsAtOnce =
-    16;  // sums that run side by side: one alone waits for each of its additions
 
 /// The frames of a window that are looked at, their means taken off.
 struct Swings {
@@ -72,14 +71,11 @@ struct Swings {
 // The mean over time of value(t, k) for each k of `out`, added up in the order of time.
 template <class Value>
 void mean_over_time(std::size_t frames, std::span<float> out, const Value& value) {
-  for (std::size_t first = 0; first < out.size(); first += kSumsAtOnce) {
-    const std::size_t count = std::min(kSumsAtOnce, out.size() - first);
-    std::array<double, kSumsAtOnce> sums{};
-    for (std::size_t t = 0; t < frames; ++t)
-      for (std::size_t k = 0; k < count; ++k) sums[k] += value(t, first + k);
-    for (std::size_t k = 0; k < count; ++k)
-      out[first + k] = static_cast<float>(sums[k] / static_cast<double>(frames));
-  }
+  std::vector<double, PoolAllocator<double>> sums(out.size());  // a window takes no heap
+  for (std::size_t t = 0; t < frames; ++t)
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += value(t, k);
+  std::ranges::transform(sums, out.begin(),
+                         [&](double sum) { return static_cast<float>(sum / static_cast<double>(frames)); });
 }
 
 // How far `width` signals are ahead of as many from `behind` on.

@@ -220,7 +220,7 @@ TEST(Trainer, ReportsPicturesThatAreTheSameForAllAndIdleLatents) {
   EXPECT_EQ(last.active_latents, 0);
 }
 
-TEST(Trainer, RefusesWindowsOfAnotherFormatOrNone) {
+TEST(Trainer, RefusesWindowsOfAnotherFormatOrNoneAndWhatTheArrayCannotDo) {
   SmallTraining small;
   const WindowSet& windows = small.windows;
   EXPECT_REFUSAL("batching: there is no window to train on", Trainer(windows, {}, small.recipe));
@@ -229,10 +229,6 @@ TEST(Trainer, RefusesWindowsOfAnotherFormatOrNone) {
       "the data have 32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8, the model "
       "expects 48 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8",
       small.trainer());
-}
-
-TEST(Trainer, RefusesWhatTheArrayCannotDo) {
-  SmallTraining small;
   small.recipe.augment.dropped = 17;
   EXPECT_REFUSAL("augmentation: dropped expects 0 to 16, got 17", small.trainer());
 }

@@ -5,7 +5,6 @@
 #include "autograd/kernels/fast/isa/isa.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/random.h"
-#include "models/inference/compiled/compiler.h"
 #include "tests/allocations.h"
 #include "tests/models/support.h"
 #include "tests/support/test.h"
@@ -57,18 +56,15 @@ SuperTacSettings random_settings(std::uint64_t seed) {
   return s;
 }
 
-TEST(CompiledModel, DrawsWhatTheNetworkDrawsForAnySettings) {
+TEST(CompiledModel, DrawsWhatTheNetworkDrawsForPresetsAndAnySettings) {
+  for (const char* preset : {"paper", "tiny", "frame"})
+    expect_same_estimate(random_network(SuperTacSettings::of_preset(preset)), 9, preset);
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
     const SuperTacSettings s = random_settings(seed);
     expect_same_estimate(random_network(s, seed), 1 + static_cast<Dim>(seed % 10),
                          "seed " + std::to_string(seed) + ": " + std::to_string(s.rows) + "x" +
                              std::to_string(s.columns) + " channels " + std::to_string(s.channels));
   }
-}
-
-TEST(CompiledModel, DrawsWhatTheNetworkDrawsForPresets) {
-  for (const char* preset : {"paper", "tiny", "frame"})
-    expect_same_estimate(random_network(SuperTacSettings::of_preset(preset)), 9, preset);
 }
 
 // All pictures of 64 windows, `batch` at a time.
@@ -131,8 +127,11 @@ TEST(CompiledModel, InBytesDrawsNearlyTheSame) {
   }
 }
 
-TEST(CompiledModel, RefusesTheRangesOfAnotherNetwork) {
+TEST(CompiledModel, RefusesTheRangesOfAnotherNetworkAndInputsOfAnotherShape) {
   const SuperTac network = random_network();
+  EXPECT_REFUSAL("CompiledModel: inputs expects [N,32,16], got [1,3,16]",
+                 CompiledModel(network).estimate(Tensor::zeros({1, 3, 16})));
+  EXPECT_EQ(CompiledModel(network).estimate(Tensor::zeros(network.input_shape(0))).picture.dim(0), 0);
   EXPECT_REFUSAL("CompiledModel: the ranges are those of 0 ops, the network has 46",
                  CompiledModel(network, ActivationRanges()));
 }
@@ -155,13 +154,6 @@ TEST(CompiledModel, RefusesRangesThatAreNotFiniteOrNoPairs) {
   EXPECT_EQ(what_of<std::runtime_error>(
                 [&] { ActivationRanges::read(SafetensorsFile::read(folder / "flat.safetensors"), "m"); }),
             "m: int8.ranges expected F32 [N,2], found F32 [4]");
-}
-
-TEST(CompiledModel, RefusesInputsOfAnotherShape) {
-  const SuperTac network = random_network();
-  EXPECT_REFUSAL("CompiledModel: inputs expects [N,32,16], got [1,3,16]",
-                 CompiledModel(network).estimate(Tensor::zeros({1, 3, 16})));
-  EXPECT_EQ(CompiledModel(network).estimate(Tensor::zeros(network.input_shape(0))).picture.dim(0), 0);
 }
 
 // A warm training step and a warm inference, compiled or not, go to the heap not once.
