@@ -27,20 +27,16 @@ int index_named(const fs::path& path, const std::string& name) {
 }
 
 ImportedPass found_pass(const fs::path& folder) {
-  const std::string name = folder.filename().string(), stl = folder.string() + ".stl";
-  const bool of_file = fs::exists(stl), unknown = !of_file && is_unknown_plate(name);
+  const std::string stl = folder.string() + ".stl", plate_file = fs::exists(stl) ? stl : "";
   try {
     ImportedPass found{.path = {},
-                       .plate = Plate::named(unknown   ? "plain"
-                                             : of_file ? stl
-                                                       : name),
-                       .unknown = unknown,
-                       .plate_file = of_file ? stl : ""};
-    found.recording.plate = unknown ? name : found.plate.name();
+                       .plate = Plate::named(plate_file.empty() ? folder.filename().string() : plate_file),
+                       .plate_file = plate_file};
+    found.recording.plate = found.plate.name();
     return found;
   } catch (const std::invalid_argument& error) {
     throw FileError(folder.string(), std::string("unknown plate: ") + error.what() +
-                                         "; or name the folder unknown_... to import it without truth");
+                                         "; text over another surface is a table of any sensor's (--sensor)");
   }
 }
 
@@ -88,7 +84,7 @@ void read_and_register(ImportedPass& pass, double speed_mm_s) {
   recording.pass = pass.recording.pass;
   recording.speed_mm_s = speed_mm_s;
   restore_clock(recording, rig::kFrameRateHz);
-  if (!pass.unknown) pass.registration = register_pass(recording, pass.plate);
+  pass.registration = register_pass(recording, pass.plate);
   pass.recording = std::move(recording);
 }
 
@@ -148,19 +144,18 @@ void import_text_folder(const std::string& root, const FolderImport& settings,
     if (plate.empty()) continue;
     any = true;
     settings.progress(static_cast<std::size_t>(end - found.begin()), found.size());
-    if (plate.front().plate.uniform_in_x() && !plate.front().unknown) align(plate);
+    if (plate.front().plate.uniform_in_x()) align(plate);
     for (ImportedPass& pass : plate)
-      if (!pass.unknown) apply(pass.registration, pass.recording, rig::pass_x_mm(pass.recording.pass));
+      apply(pass.registration, pass.recording, rig::pass_x_mm(pass.recording.pass));
     take(std::move(plate));
   }
   if (!any) throw FileError(root, "none of " + std::to_string(found.size()) + " files is a recording");
 }
 
 std::string ImportedPass::summary() const {
-  std::string line = (unknown ? recording.plate : plate.name()) + "/" + std::to_string(recording.trial) +
-                     "/" + std::to_string(recording.pass) + ".txt  " + std::to_string(lines) + " lines, " +
+  std::string line = plate.name() + "/" + std::to_string(recording.trial) + "/" +
+                     std::to_string(recording.pass) + ".txt  " + std::to_string(lines) + " lines, " +
                      std::to_string(dropped) + " dropped, ";
-  if (unknown) return line + "of unknown shape: no position, no truth";
   line += "residual " + format(registration.residual, 2) + " mm, ";
   if (registration.agreement > 0) line += "aligned by " + format(registration.shift_mm, 2) + " mm, ";
   if (registration.lost_s > 0) line += "another " + format(registration.lost_s, 2) + " s lost, ";

@@ -18,7 +18,6 @@ namespace supertac {
 struct ImportedPass {
   std::string path;  ///< of the text file
   Plate plate;
-  bool unknown = false;    ///< the plate's shape: then `plate` is plain, the recording has its name
   std::string plate_file;  ///< the STL file that describes the plate; empty when its name does
   Recording recording = {};
   std::size_t lines = 0, dropped = 0;  ///< of the text file; empty ones do not count
@@ -43,10 +42,8 @@ struct FolderImport {
 std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder, bool folders);
 
 /// Imports a folder of the rig's text recordings, `PLATE/TRIAL/PASS.txt` with PLATE a name that
-/// Plate::named takes, or `PLATE.stl` beside its folder, or any name that begins with "unknown": passes over
-/// an unknown shape are not registered and have no positions (is_unknown_plate()). The recordings have plate,
-/// trial, pass, speed, positions, a clock in seconds and the metadata of apply(); they are in the order of
-/// their names.
+/// Plate::named takes, or `PLATE.stl` beside its folder. The recordings have plate, trial, pass, speed,
+/// positions, a clock in seconds and the metadata of apply(); they are in the order of their names.
 ///
 /// The files hold no clock. Steps 1, 2 and 5 write it, and each step needs what the one before left:
 ///   1. import_text_pass() counts the lines: frame i at i / rig::kFrameRateHz. A dropped line keeps its

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "data/plates/stl.h"
 
@@ -13,27 +14,21 @@ constexpr double kSliverMm = 1e-3;  // lines, and heights, closer than this are 
 
 using Vertex = std::array<float, 3>;
 
-// Multiples of the step within (low, high), and these two.
-std::vector<double> lattice(double low, double high) {
-  std::vector<double> lines = {low, high};
+// These lines, low and high, and the multiples of the step between, none of them slivers.
+std::vector<double> lattice(double low, double high, std::vector<double> lines = {}) {
+  lines.insert(lines.end(), {low, high});
   for (auto i = std::ceil(low / kStepMm); i * kStepMm < high; ++i) lines.push_back(i * kStepMm);
+  std::ranges::sort(lines);
+  const auto slivers = std::ranges::unique(lines, [](double a, double b) { return b - a <= kSliverMm; });
+  lines.erase(slivers.begin(), slivers.end());
   return lines;
 }
 
-std::vector<double> without_slivers(std::vector<double> lines) {
-  std::sort(lines.begin(), lines.end());
-  std::vector<double> kept;
-  for (const double line : lines)
-    if (kept.empty() || line - kept.back() > kSliverMm) kept.push_back(line);
-  return kept;
-}
-
 std::vector<double> lines_along_y(const Plate& plate) {
-  const double begin = std::max(0.0, plate.texture_begin()), end = plate.texture_end();
-  std::vector<double> lines = lattice(begin, std::max(begin, end));
+  std::vector<double> lines = plate.crests();
   lines.insert(lines.end(), {0, rig::kPlateLengthMm});
-  for (const double crest : plate.crests()) lines.push_back(crest);
-  return without_slivers(lines);
+  const double begin = std::max(0.0, plate.texture_begin());
+  return lattice(begin, std::max(begin, plate.texture_end()), std::move(lines));
 }
 
 // The top's points, row by row; xs and ys ascend.
@@ -53,7 +48,7 @@ bool is_same_along_x(const Plate& plate, const std::vector<double>& xs, const st
 
 Top top_of(const Plate& plate) {
   Top top;
-  top.xs = without_slivers(lattice(0, rig::kPlateWidthMm));
+  top.xs = lattice(0, rig::kPlateWidthMm);
   top.ys = lines_along_y(plate);
   if (is_same_along_x(plate, top.xs, top.ys)) top.xs = {0, rig::kPlateWidthMm};
   for (const double y : top.ys)

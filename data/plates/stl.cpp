@@ -45,10 +45,8 @@ class Words {
 
   /// The next word; empty at the end.
   std::string_view next() {
-    for (; at_ < text_.size() && is_space(text_[at_]); ++at_)
-      line_ += text_[at_] == '\n' || (text_[at_] == '\r' && text_.substr(at_ + 1, 1) != "\n");
-    const std::size_t begin = at_;
-    while (at_ < text_.size() && !is_space(text_[at_])) ++at_;
+    const std::size_t begin = std::min(text_.find_first_not_of(kSpace, at_), text_.size());
+    at_ = std::min(text_.find_first_of(kSpace, begin), text_.size());
     return text_.substr(begin, at_ - begin);
   }
   void skip_line() { at_ = std::min(text_.find_first_of("\r\n", at_), text_.size()); }
@@ -65,16 +63,17 @@ class Words {
     return std::ranges::equal(found, word, {}, lower);
   }
   [[noreturn]] void reject(const std::string& expected, std::string_view found) const {
-    throw FileError(name_, "line " + std::to_string(line_) + ": expected " + expected + ", found " +
+    const auto line = 1 + std::ranges::count(text_.substr(0, at_), '\n');
+    throw FileError(name_, "line " + std::to_string(line) + ": expected " + expected + ", found " +
                                (found.empty() ? "the end of the file" : in_quotes(found)) +
                                "; the file is damaged or no STL, export it again");
   }
 
  private:
-  static bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+  static constexpr std::string_view kSpace = " \t\n\v\f\r";
   std::string_view text_;
   const std::string& name_;
-  std::size_t at_ = 0, line_ = 1;
+  std::size_t at_ = 0;
 };
 
 // Behind the word "facet".

@@ -139,8 +139,7 @@ class Fit {
       line.middle_mm += (wtt * wd - wt * wtd) / determinant;
       line.rate += (w * wtd - wt * wd) / determinant;
     }
-    const Line again = scored(line.middle_mm, line.rate);
-    line.matched = again.matched, line.coverage = again.coverage, line.score = again.score;
+    line = scored(line.middle_mm, line.rate);
   }
 
   Match match(const Event& event, const Line& line) const {
@@ -198,20 +197,12 @@ class Fit {
       best = std::max(best, fit);
     }
     line.matched = total > 0 ? agree / total : 0;
-    double elements = 0;
-    felt_shares(felt, line, elements);
-    line.score = line.matched + line.coverage + elements + preference(middle_mm, rate);
-    return line;
-  }
-
-  // Of the (element, row) pairs the stretch reached: share felt (line.coverage), and share of elements felt
-  // by a row.
-  void felt_shares(const std::vector<double>& felt, Line& line, double& elements) const {
+    // Of the (element, row) pairs the stretch reached: share felt, and share of elements felt by a row.
     double pairs = 0, felt_pairs = 0, reached = 0, felt_elements = 0;
     for (std::size_t j = 0; j < crests_.size(); ++j) {
       double best = -1;
       for (std::size_t row = 0; row < row_mm_.size(); ++row) {
-        const double time = (crests_[j] - row_mm_[row] - line.middle_mm) / line.rate + middle_s_;
+        const double time = (crests_[j] - row_mm_[row] - middle_mm) / rate + middle_s_;
         if (time < stretch_.begin_s || time > stretch_.end_s) continue;
         pairs += 1, felt_pairs += felt[j * row_mm_.size() + row];
         best = std::max(best, felt[j * row_mm_.size() + row]);
@@ -219,7 +210,9 @@ class Fit {
       if (best >= 0) reached += 1, felt_elements += best;
     }
     line.coverage = pairs > 0 ? felt_pairs / pairs : 0;
-    elements = reached > 0 ? felt_elements / reached : 0;
+    const double elements = reached > 0 ? felt_elements / reached : 0;
+    line.score = line.matched + line.coverage + elements + preference(middle_mm, rate);
+    return line;
   }
 
   std::vector<double> crests_, row_mm_;
@@ -286,22 +279,22 @@ void fill_loss(const Registration& registration, Recording& recording) {
   const std::size_t signals = recording.array.signals();
   const double step = (time[at - 1] - time[0]) / static_cast<double>(at - 1), gap = time[at] - time[at - 1];
   const auto lost = static_cast<std::size_t>(std::max(0.0, gap / step - 1));
-  std::vector<double> times(lost);
-  std::vector<float> volts(lost * signals);
-  std::vector<float> places(2 * lost, std::numeric_limits<float>::quiet_NaN());
+  const auto open = [lost](auto& values, std::size_t before, std::size_t each, auto value) {
+    values.insert(values.begin() + static_cast<std::ptrdiff_t>(before * each), lost * each, value);
+  };
+  const double last_s = time[at - 1];
+  const float x_mm = recording.position_mm[0];
+  open(time, at, 1, 0.0), open(recording.signals, at, signals, 0.0F);
+  open(recording.position_mm, at, 2, std::numeric_limits<float>::quiet_NaN());
   for (std::size_t k = 0; k < lost; ++k) {
     const double part = static_cast<double>(k + 1) / static_cast<double>(lost + 1);
-    times[k] = time[at - 1] + part * gap;
+    time[at + k] = last_s + part * gap;
+    recording.position_mm[2 * (at + k)] = x_mm;
     for (std::size_t s = 0; s < signals; ++s)
-      volts[k * signals + s] = std::lerp(recording.signals[(at - 1) * signals + s],
-                                         recording.signals[at * signals + s], static_cast<float>(part));
-    places[2 * k] = recording.position_mm[0];
+      recording.signals[(at + k) * signals + s] =
+          std::lerp(recording.signals[(at - 1) * signals + s], recording.signals[(at + lost) * signals + s],
+                    static_cast<float>(part));
   }
-  const auto before = static_cast<std::ptrdiff_t>(at);
-  time.insert(time.begin() + before, times.begin(), times.end());
-  recording.signals.insert(recording.signals.begin() + before * static_cast<std::ptrdiff_t>(signals),
-                           volts.begin(), volts.end());
-  recording.position_mm.insert(recording.position_mm.begin() + 2 * before, places.begin(), places.end());
 }
 
 }  // namespace

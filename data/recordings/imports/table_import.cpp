@@ -182,12 +182,6 @@ float checked_mm(const std::string& path, const Table& table, std::size_t column
       path, name_of(table, column) + " as a position holds " + format(mm) + ", expected mm on the plate");
 }
 
-float interpolated(const std::string& path, const Table& log, std::size_t before, std::size_t column,
-                   double share) {
-  const double a = log.row(before)[column], b = log.row(before + 1)[column];
-  return checked_mm(path, log, column, a + share * (b - a));
-}
-
 }  // namespace
 
 ColumnMap column_map(const std::string& text) {
@@ -276,8 +270,11 @@ void add_positions(Recording& recording, const std::string& path, const Table& l
     if (after == time_s.begin() || (after == time_s.end() && t > time_s.back())) continue;
     const auto before = static_cast<std::size_t>(std::min(after, time_s.end() - 1) - time_s.begin()) - 1;
     const double share = (t - time_s[before]) / (time_s[before + 1] - time_s[before]);
-    recording.position_mm[2 * i] = interpolated(path, log, before, x, share);
-    recording.position_mm[2 * i + 1] = interpolated(path, log, before, y, share);
+    for (const std::size_t axis : {0U, 1U}) {
+      const std::size_t column = axis == 0 ? x : y;
+      const double a = log.row(before)[column], b = log.row(before + 1)[column];
+      recording.position_mm[2 * i + axis] = checked_mm(path, log, column, a + share * (b - a));
+    }
     ++known;
   }
   if (10 * known < recording.frames())

@@ -2,7 +2,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "data/windows/windows.h"
 #include "tests/data/registration/lossy_pass.h"
 #include "tests/support/test.h"
 
@@ -83,79 +82,40 @@ TEST(TextFolder, APlateOfYourOwnLiesBesideItsFolder) {
   EXPECT_EQ(imported[0].registration.reason, "a plain plate has nothing to register against");
 }
 
-TEST(TextFolder, APlateOfUnknownShapeIsImportedWithoutPositions) {
-  const TemporaryFolder folder;
-  put(folder, "unknown_felt/2/5.txt", as_text(full_pass("3_Bumps", 5, 1)));
-  const auto imported = import_all(folder.path(), {});
-  ASSERT_EQ(imported.size(), 1u);
-  const Recording& recording = imported[0].recording;
-  EXPECT_EQ(recording_file_name(recording), "unknown_felt_t2_p5_v10.safetensors");
-  EXPECT_GT(recording.frames(), 1000u);
-  EXPECT_TRUE(recording.position_mm.empty());
-  EXPECT_TRUE(imported[0].summary().ends_with("of unknown shape: no position, no truth"))
-      << imported[0].summary();
-  WindowSet windows((WindowSettings()));
-  EXPECT_REFUSAL(
-      "these signals have no truth to train on or score. Learn from simulated presses "
-      "(supertac-simulate --sensor FILE --presses N), film what presses (supertac-import --truth), or slide "
-      "over a plate that is known (supertac-import --plate NAME)",
-      windows.add(recording));
-}
-
-TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {
-  const TemporaryFolder folder;
-  const std::string bad = put(folder, "plain/1/1.txt", "no numbers at all\n");
-  EXPECT_EQ(what_of<FileError>([&] { import_all(folder.path(), {}); }),
-            bad +
-                ": holds no line of numbers (too few lines); expected a row a line, separated by commas, "
-                "tabs or blanks");
-  std::vector<std::string> left_out;
-  const FolderImport lenient{.left_out = [&](const FileError& error) { left_out.push_back(error.what()); }};
-  EXPECT_EQ(what_of<FileError>([&] { import_all(folder.path(), lenient); }),
-            folder.path() + ": none of 1 files is a recording");
-  put(folder, "plain/1/2.txt", as_text(full_pass("plain", 2, 1)));
-  EXPECT_EQ(import_all(folder.path(), lenient).size(), 1u);
-  ASSERT_EQ(left_out.size(), 2u);
-  EXPECT_TRUE(left_out[1].starts_with(bad + ": holds no line of numbers")) << left_out[1];
-}
-
 // A published folder: remarks beside the passes, a plate in other letters, one that nobody knows.
-TEST(TextFolder, WhatIsNoPassIsLeftOutByName) {
-  const TemporaryFolder folder;
-  const std::string text = as_text(full_pass("plain", 2, 1));
-  put(folder, "plain/1/2.txt", text);
-  const std::string others[] = {put(folder, "plain/1/InitTime.txt", "start? ENTER\n"),
-                                put(folder, "plain/1/02.txt", text), put(folder, "plain/notes/1.txt", text),
-                                put(folder, "Plain/1/1.txt", text), put(folder, "Test/1/1.txt", text)};
-  std::string left_out;
-  const auto imported =
-      import_all(folder.path(),
-                 {.left_out = [&](const FileError& error) { left_out += std::string(error.what()) + "\n"; }});
-  EXPECT_EQ(imported.size(), 1u);
-  EXPECT_EQ(std::ranges::count(left_out, '\n'), 5) << left_out;
-  for (const char* reason :
-       {"InitTime.txt: expected a number", "is the same trial and pass as", "notes: expected a number",
-        "Plain: unknown plate: plate \"Plain\": unknown texture", "Test: unknown plate"})
-    EXPECT_NE(left_out.find(reason), std::string::npos) << reason << "\n" << left_out;
-}
-
-TEST(TextFolder, AFolderOfAnotherShapeIsNamed) {
-  const std::string number = "expected a number from 1 as its name: TEXT_DIR/<plate>/<trial>/<pass>.txt";
+TEST(TextFolder, WhatIsNoPassIsNamedAndLeftOutWhenAskedTo) {
+  const std::string number = "expected a number from 1 as its name: TEXT_DIR/<plate>/<trial>/<pass>.txt",
+                    text = as_text(full_pass("plain", 2, 1));
   const std::tuple<std::string, std::string, std::string> cases[] = {
-      {"7_Moons/1/1.txt", "7_Moons", "unknown plate: plate \"7_Moons\": unknown texture"},
-      {"3_Bumps/one/1.txt", "3_Bumps/one", number},
-      {"3_Bumps/0/1.txt", "3_Bumps/0", number},
-      {"3_Bumps/1/first.txt", "3_Bumps/1/first.txt", number},
-      {"3_Bumps/1/1.csv", "", "holds no <plate>/<trial>/<pass>.txt; name the folder above the plates"}};
+      {"plain/1/1.txt", "plain/1/1.txt",
+       "holds no line of numbers (too few lines); expected a row a line, separated by commas, tabs or "
+       "blanks"},
+      {"plain/1/InitTime.txt", "plain/1/InitTime.txt", number},
+      {"plain/1/2.txt", "plain/1/2.txt", "is the same trial and pass as"},
+      {"plain/notes/1.txt", "plain/notes", number},
+      {"plain/0/1.txt", "plain/0", number},
+      {"Plain/1/1.txt", "Plain", "unknown plate: plate \"Plain\": unknown texture"}};
   for (const auto& [file, named, message] : cases) {
     const TemporaryFolder folder;
-    put(folder, file, "");
-    const std::string where = named.empty() ? folder.path() : folder.file(named);
-    EXPECT_ERROR(import_all(folder.path(), {}), FileError, where + ": " + message);
+    put(folder, "plain/1/02.txt", text);
+    put(folder, file, "start? ENTER\n");
+    const std::string refusal = folder.file(named) + ": " + message;
+    EXPECT_ERROR(import_all(folder.path(), {}), FileError, refusal);
+    std::vector<std::string> left_out;
+    const FolderImport lenient{.left_out = [&](const FileError& e) { left_out.push_back(e.what()); }};
+    EXPECT_EQ(import_all(folder.path(), lenient).size(), 1u) << file;
+    ASSERT_EQ(left_out.size(), 1u) << file;
+    EXPECT_TRUE(left_out[0].starts_with(refusal)) << left_out[0];
   }
   const TemporaryFolder folder;
-  EXPECT_EQ(what_of<FileError>([&] { import_all(folder.file("none"), {}); }),
-            folder.file("none") + ": cannot list the folder: No such file or directory; check the name");
+  put(folder, "plain/1/1.csv", text);
+  EXPECT_ERROR(import_all(folder.path(), {}), FileError,
+               "holds no <plate>/<trial>/<pass>.txt; name the folder");
+  put(folder, "plain/1/1.txt", "no numbers at all\n");
+  EXPECT_ERROR(import_all(folder.path(), {.left_out = [](const FileError&) {}}), FileError,
+               "none of 1 files is a recording");
+  EXPECT_EQ(what_of<FileError>([&] { import_all("/nowhere", {}); }),
+            "/nowhere: cannot list the folder: No such file or directory; check the name");
 }
 
 TEST(TextFolder, TheSummaryTellsWhatBecameOfAPass) {

@@ -127,59 +127,54 @@ TEST(Recording, FileNameTellsWhatItIs) {
   EXPECT_EQ(recording_file_name(recording), "3_Bumps_t2_p5_v7.5.safetensors");
 }
 
-TEST(Recording, WritesNoneThatBreaksARule) {
-  TemporaryFolder folder;
+TEST(Recording, KnowsWhatBreaksARule) {
   const std::pair<void (*)(Recording&), const char*> cases[] = {
       {[](Recording& r) { r.signals.pop_back(); }, "signals has 111 values, expected 112 for 7 frames"},
       {[](Recording& r) { r.position_mm.pop_back(); }, "position_mm has 13 values, expected 14 for 7 frames"},
       {[](Recording& r) { r.time_s[3] = r.time_s[2]; }, "time_s does not increase at frame 3"},
       {[](Recording& r) { r.time_s[3] = std::nan(""); }, "time_s is not finite at frame 3"},
-      {[](Recording& r) { r.signals[17] = INFINITY; }, "signals are not finite at frame 1, taxel 1"},
+      {[](Recording& r) { r.time_s[6] = 1e300; }, "time_s lies beyond 1e+10 s"},
+      {[](Recording& r) { r.signals[20] = INFINITY; }, "signals are not finite at frame 1, taxel 4"},
       {[](Recording& r) { r.trial = -1; }, "trial and pass must not be negative"},
-      {[](Recording& r) { r.metadata["plate"] = "x"; },
-       "the metadata field 'plate' is a member of the recording; set it there"}};
-  for (const auto& [damage, refusal] : cases) {
+      {[](Recording& r) { r.speed_mm_s = std::nan(""); }, "speed_mm_s is nan, expected 0 to 10000"}};
+  for (const auto& [damage, problem] : cases) {
     Recording recording = example();
     damage(recording);
-    EXPECT_REFUSAL(std::string("write_recording: ") + refusal, write_recording(folder.file("a"), recording));
+    EXPECT_EQ(problem_of(recording), problem);
   }
-  EXPECT_EQ(folder.entries(), 0u);
+  for (const auto& [key, expected] : {std::pair("filter_s", "0 to 10 s"), {"began_s", "seconds since 1970"}})
+    for (const char* impossible : {"-1", "1e300", "nan", "long"}) {
+      Recording recording = example();
+      recording.metadata[key] = impossible;
+      EXPECT_EQ(problem_of(recording), std::string(key) + " is '" + impossible + "', expected " + expected);
+    }
+  Recording recording = example();
+  recording.metadata["began_s"] = "1700000000.5";
+  EXPECT_EQ(problem_of(recording), std::nullopt);
 }
 
-TEST(Recording, ReadsNoneThatBreaksARule) {
-  const auto with = [](const std::string& key, const std::string& value) {
-    Parts parts;
-    parts.metadata[key] = value;
-    return message_of_parts(parts);
-  };
-  EXPECT_EQ(message_of_parts({}), "nothing thrown");
-  EXPECT_EQ(with("kind", "checkpoint"), "is a 'checkpoint', expected a recording");
-  EXPECT_EQ(with("trial", "-1"), "trial is '-1', expected a number from 0 to 1000000");
-  EXPECT_EQ(with("pass", "99999999999999999999"),
-            "pass is '99999999999999999999', expected a number from 0 to 1000000");
-  EXPECT_EQ(with("speed_mm_s", "fast"), "speed_mm_s is 'fast', expected a number");
-  EXPECT_EQ(with("speed_mm_s", "nan"), "speed_mm_s is nan, expected 0 to 10000; record or import it again");
-  for (const char* impossible : {"-1", "1e300", "nan", "long"})
-    EXPECT_EQ(with("filter_s", impossible),
-              "filter_s is '" + std::string(impossible) + "', expected 0 to 10 s; record or import it again");
-  for (const char* impossible : {"-1", "1e300", "nan", "yesterday"})
-    EXPECT_EQ(with("began_s", impossible), "began_s is '" + std::string(impossible) +
-                                               "', expected seconds since 1970; record or import it again");
-  EXPECT_EQ(with("began_s", "1700000000.5"), "nothing thrown");
+TEST(Recording, IsNeitherWrittenNorReadThatBreaksARule) {
+  const TemporaryFolder folder;
+  Recording recording = example();
+  recording.metadata["plate"] = "x";
+  EXPECT_REFUSAL("write_recording: the metadata field 'plate' is a member of the recording; set it there",
+                 write_recording(folder.file("a"), recording));
+  recording.signals.pop_back();
+  EXPECT_REFUSAL("write_recording: signals has 111 values, expected 112 for 7 frames",
+                 write_recording(folder.file("a"), recording));
+  EXPECT_EQ(folder.entries(), 0u);
   const std::pair<void (*)(Parts&), const char*> cases[] = {
-      {[](Parts& p) {
-         p.time_s = {0, 1e300};
-       },
-       "time_s lies beyond 1e+10 s; record or import it again"},
+      {[](Parts&) {}, "nothing thrown"},
+      {[](Parts& p) { p.metadata["kind"] = "checkpoint"; }, "is a 'checkpoint', expected a recording"},
+      {[](Parts& p) { p.metadata["trial"] = "-1"; }, "trial is '-1', expected a number from 0 to 1000000"},
+      {[](Parts& p) { p.metadata["pass"] = "99999999999999999999"; },
+       "pass is '99999999999999999999', expected a number from 0 to 1000000"},
+      {[](Parts& p) { p.metadata["speed_mm_s"] = "fast"; }, "speed_mm_s is 'fast', expected a number"},
       {[](Parts& p) { p.metadata.erase("plate"); }, "is not a recording: the metadata lacks 'plate'"},
       {[](Parts& p) {
          p.signals_shape = {16, 2};
        },
        "tensor 'volts' has shape [16,2], expected [2,16]"},
-      {[](Parts& p) {
-         p.time_s = {0.1, 0.1};
-       },
-       "time_s does not increase at frame 1; record or import it again"},
       {[](Parts& p) { p.signals[20] = NAN; },
        "signals are not finite at frame 1, taxel 4; record or import it again"}};
   for (const auto& [damage, refusal] : cases) {

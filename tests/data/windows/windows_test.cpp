@@ -157,12 +157,10 @@ TEST(Windows, OfAnyArray) {
   EXPECT_EQ(set.raw_window(0).size(), 32U * 36);
   EXPECT_EQ(set.shown_frame(5).size(), 36U);
   std::vector<float> truth(576), expected(576);
-  for (std::size_t i = 0; i < set.size(); i += 97) {
-    if (set.zone(i) == Zone::air) continue;
-    set.truth(i, truth);
-    truth_image(Plate::named("4_Blob"), set.position(i).x_mm, set.position(i).y_mm, {24, 24, 0.5}, expected);
-    ASSERT_EQ(truth, expected);
-  }
+  set.truth(800, truth);
+  truth_image(Plate::named("4_Blob"), set.position(800).x_mm, set.position(800).y_mm, {24, 24, 0.5},
+              expected);
+  EXPECT_EQ(truth, expected);
 }
 
 TEST(Windows, RefuseRecordingsOfAnotherArray) {
@@ -219,6 +217,11 @@ TEST(Windows, RefuseOutputsOfAnotherSizeAndUnknownPlates) {
   EXPECT_REFUSAL("windows: a truth image needs room for 256 values, got 255", set.truth(0, small));
   EXPECT_ERROR(set.add(make_recording({.plate = "carpet"})), std::invalid_argument,
                "plate \"carpet\": unknown texture \"carpet\"; expected a rig plate");
+  EXPECT_REFUSAL(
+      "these signals have no truth to train on or score. Learn from simulated presses "
+      "(supertac-simulate --sensor FILE --presses N), film what presses (supertac-import --truth), or slide "
+      "over a plate that is known (supertac-import --plate NAME)",
+      set.add(make_recording({.plate = "unknown_felt"})));
   EXPECT_EQ(set.size(), 85U);
 }
 
