@@ -55,6 +55,7 @@ struct FieldFound {
   double bits = 0;
   bool sure = true;  ///< false for a clock whose unit is only likely, and for bytes of no known meaning
   bool big_endian = false;
+  bool unknown() const { return field.is == FrameField::Is::skip && !sure; }
 };
 
 /// Costs in bits of the columns of a stretch. A signal costs what its steps in time do - how large each is,
@@ -124,10 +125,10 @@ struct BinaryReading {
 };
 /// Of numbers of two bytes a higher one changes, and no lower one has its highest bit.
 bool holds_seven_bits(const BinaryReading& reading, std::span<const Heard> heard);
-/// The best reading of the bytes, where it leads the second by 8 bits (256 to 1), and no reading takes a part
-/// of its frames for whole ones; else empty, and `says` names both. `values`: how many a frame has, where
-/// that is known.
-std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
+/// The best reading of all bytes that were heard, where it leads the second by 8 bits (256 to 1), and no
+/// reading takes a part of its frames for whole ones; else empty, and `says` names both. `values`: how many a
+/// frame has, where that is known.
+std::optional<BinaryReading> find_binary_format(Bytes bytes, std::span<const Heard> heard,
                                                 std::optional<std::size_t> values,
                                                 std::vector<std::string>& says);
 

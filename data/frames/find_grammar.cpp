@@ -250,60 +250,59 @@ void say_what_was_taken_away(const std::vector<std::string>& raw, TextGrammar& g
 bool fill_slots(const std::vector<std::string>& lines, TextGrammar& grammar) {
   FrameFormat read = grammar.format;
   read.checksum = "none";  // has been taken away
-  TextFrames frames(read);
-  struct Frame {
-    std::vector<double> values;
-    std::vector<bool> words, wall;
-    std::vector<std::string> before, text, unit;
-    std::vector<std::size_t> line;
+  const auto each_frame = [&](const auto& take) {
+    TextFrames frames(read);
+    for (const std::string& line : lines)
+      if (frames.push(line) == TextFrames::Result::frame) take(frames.slots());
   };
-  std::vector<Frame> all;
-  std::vector<std::vector<std::string>> all_words;  // lines that name what follows
-  double written = 0;                               // lines that are not empty
-  std::map<std::vector<bool>, std::size_t> forms;   // which cells are words
-  for (const std::string& line : lines) {
-    written += line.empty() ? 0 : 1;
-    if (frames.push(line) != TextFrames::Result::frame) continue;
-    Frame frame;
-    for (const TextSlot& slot : frames.slots()) {
-      frame.values.push_back(slot.value), frame.words.push_back(slot.words), frame.wall.push_back(slot.wall);
-      frame.before.emplace_back(slot.before), frame.text.emplace_back(slot.text);
-      frame.unit.emplace_back(slot.unit), frame.line.push_back(slot.line);
+  const auto words_of = [](const std::vector<TextSlot>& slots) {
+    std::vector<bool> words;
+    for (const TextSlot& slot : slots) words.push_back(slot.words);
+    return words;
+  };
+  std::map<std::size_t, std::vector<std::string>> names;  // lines that name what follows, by their cells
+  std::map<std::vector<bool>, std::size_t> forms;         // which cells are words
+  each_frame([&](const std::vector<TextSlot>& slots) {
+    if (const auto words = words_of(slots); std::ranges::count(words, false) > 0) {
+      ++forms[words];
+      return;
     }
-    if (std::ranges::count(frame.words, false) == 0) {
-      all_words.push_back(std::move(frame.text));
-      continue;
-    }
-    ++forms[frame.words];
-    all.push_back(std::move(frame));
-  }
+    std::vector<std::string>& cells = names[slots.size()];
+    cells.clear();
+    for (const TextSlot& slot : slots) cells.emplace_back(slot.text);
+  });
   if (forms.empty()) return false;
-  const std::vector<bool> usual =
-      std::ranges::max_element(forms, {}, [](const auto& f) {
-        return f.second * static_cast<std::size_t>(std::ranges::count(f.first, false));
-      })->first;
-  std::erase_if(all, [&](const Frame& frame) { return frame.words != usual; });
-  if (all.empty() || static_cast<double>(all.size()) * grammar.format.lines_per_frame < 0.4 * written)
+  const auto form = std::ranges::max_element(forms, {}, [](const auto& f) {
+    return f.second * static_cast<std::size_t>(std::ranges::count(f.first, false));
+  });
+  const std::vector<bool>& usual = form->first;
+  const std::size_t count = form->second;
+  if (static_cast<double>(count) * grammar.format.lines_per_frame <
+      0.4 * static_cast<double>(lines.size() - std::ranges::count(lines, "")))
     return false;
-  const Frame& sample = all[all.size() / 2];
-  grammar.words = usual, grammar.wall = sample.wall;
-  grammar.before = sample.before, grammar.sample = sample.text, grammar.line = sample.line;
-  for (auto& names : all_words)
-    if (names.size() == usual.size()) grammar.names = std::move(names);
   std::map<std::vector<std::string>, std::size_t> units;
-  grammar.columns.resize(usual.size()), grammar.decimals.resize(usual.size());
-  for (const Frame& frame : all) {
-    ++units[frame.unit];
-    for (std::size_t c = 0; c < usual.size(); ++c) {
-      grammar.columns[c].push_back(frame.values[c]);
-      const std::size_t point = frame.text[c].find_first_of(grammar.format.decimal == ',' ? ",." : ".");
+  std::size_t number = 0;
+  grammar.slots.resize(usual.size());
+  each_frame([&](const std::vector<TextSlot>& slots) {
+    if (words_of(slots) != usual) return;
+    const bool is_sample = number++ == count / 2;
+    std::vector<std::string> unit;
+    for (std::size_t c = 0; c < slots.size(); ++c) {
+      FoundSlot& found = grammar.slots[c];
+      const TextSlot& slot = slots[c];
+      found.column.push_back(slot.value), unit.emplace_back(slot.unit);
+      if (is_sample)
+        found.before = slot.before, found.sample = slot.text, found.line = slot.line,
+        found.words = slot.words, found.wall = slot.wall;
+      const std::size_t point = slot.text.find_first_of(grammar.format.decimal == ',' ? ",." : ".");
       if (point != std::string::npos)
-        grammar.decimals[c] =
-            std::max(grammar.decimals[c], static_cast<int>(frame.text[c].size() - point - 1));
+        found.decimals = std::max(found.decimals, static_cast<int>(slot.text.size() - point - 1));
     }
-  }
-  if (20 * std::ranges::max_element(units, {}, [](const auto& u) { return u.second; })->second <
-      19 * all.size())
+    ++units[unit];
+  });
+  if (const auto named = names.find(usual.size()); named != names.end())
+    for (std::size_t c = 0; c < usual.size(); ++c) grammar.slots[c].name = named->second[c];
+  if (20 * std::ranges::max_element(units, {}, [](const auto& u) { return u.second; })->second < 19 * count)
     grammar.doubt = "the same number has another unit, or brackets, at times: what they mean is not known";
   return true;
 }

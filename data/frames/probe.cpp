@@ -146,8 +146,9 @@ std::optional<FoundFormat> candidate_of(const std::string& bytes, std::span<cons
   // Values of bytes may happen to be printable; lines with a NUL beside each character are text.
   const bool wide = padded && nul > 0.1 * all && bytes.find_first_of("\r\n") != std::string::npos;
   if (!found && printable < all && !(text && wide)) {
+    const Bytes view(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
     const auto binary =
-        find_binary_format(heard, known ? std::optional(known->values()) : std::nullopt, of_binary);
+        find_binary_format(view, heard, known ? std::optional(known->values()) : std::nullopt, of_binary);
     const auto shape = binary ? assumed_array(binary->values) : std::nullopt;
     if (shape) found = FoundFormat{binary->format, *shape, "", {}}, text = false;
   }

@@ -1,6 +1,7 @@
 // What a binary stream is: of all readings - header, fields, values, checksum, trailer - the one that
 // describes the bytes in the fewest bits.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <tuple>
@@ -63,9 +64,30 @@ double bits_of_type(const std::string& type) {
 }
 
 struct Checksum {
-  const char* kind = nullptr;
+  const char* kind = "none";
   bool big_endian = false;
-  std::size_t from = 0;  // bytes of the header that it does not cover
+};
+
+// A reading as far as it is made: what is left from `begin` to `end` are values, or fields beside them.
+struct Partly {
+  std::size_t start = 0, header = 0, trailer = 0;
+  double end_bits = 0, field_bits = 0;
+  Checksum checksum = {};
+  std::size_t from = 0;  // bytes of the header that the checksum does not cover
+  std::size_t begin = 0, end = 0;
+  std::array<const FieldFound*, 2> found = {};
+  std::size_t before = 0, all = 0;  // of the fields found: those before the values come first
+
+  std::span<const FieldFound* const> fields() const { return std::span(found).first(all); }
+  Partly with(const FieldFound& field, bool is_before) const {
+    Partly more = *this;
+    more.found[more.all++] = &field, more.field_bits += field.bits;
+    if (is_before)
+      ++more.before, more.begin += field.width;
+    else
+      more.end -= field.width;
+    return more;
+  }
 };
 
 // Of one period.
@@ -76,9 +98,10 @@ class Search {
       : columns_(columns),
         period_(columns.stretch().period),
         start_bits_(std::move(start_bits)),
-        wanted_(values) {
-    outside_ = 8.0 * static_cast<double>(bytes.size() - (columns.stretch().rows - 1) * period_);
-    counts_.resize(period_ + 1, -1);
+        counts_(period_ + 1, -1),
+        wanted_(values),
+        sent_(8.0 * static_cast<double>(bytes.size())),
+        outside_(8.0 * static_cast<double>(bytes.size() - (columns.stretch().rows - 1) * period_)) {
     find_checksums();
   }
 
@@ -103,13 +126,6 @@ class Search {
   }
 
  private:
-  using Parts = std::vector<const FieldFound*>;
-  struct Ends {
-    std::size_t header = 0, trailer = 0;
-    const Checksum* checksum = nullptr;
-    double bits = 0;
-  };
-
   void find_checksums() {
     std::size_t summed = 0;  // bytes; 150 million take some tenths of a second
     for (std::size_t end = 0; end < period_; ++end)
@@ -123,10 +139,8 @@ class Search {
           const std::size_t to = from < end ? end : end + period_;
           summed += width > 1 ? 2 * period_ : period_;
           for (const bool big : {false, true})
-            if ((width > 1 || !big) && columns_.is_checksum(kind, big, from, to)) {
-              const auto place = std::pair(end, gap);
-              if (!checksums_.contains(place)) checksums_[place] = {kind, big, 0};
-            }
+            if ((width > 1 || !big) && columns_.is_checksum(kind, big, from, to))
+              checksums_.try_emplace({end, gap}, Checksum{kind, big});
         }
       }
   }
@@ -141,90 +155,68 @@ class Search {
                        bits_of_mark(columns_.usual(start + header - 1),
                                     header == 1 ? -1 : columns_.usual(start + header - 2));
       if (header_bits == kNever) break;
-      Ends ends{header, trailer, nullptr,
-                outside_ + trailer_bits + header_bits + kLengths[header] + start_bits_[start]};
-      if (header + trailer > 0) try_fields(start, ends);
+      const Partly plain{
+          .start = start,
+          .header = header,
+          .trailer = trailer,
+          .end_bits = outside_ + trailer_bits + header_bits + kLengths[header] + start_bits_[start],
+          .begin = start + header,
+          .end = start + period_ - trailer};
+      if (header + trailer > 0) try_fields(plain);
       for (const std::size_t width : {1, 2, 4}) {
         if (header + trailer + width + 2 > period_) continue;
         const std::size_t end = (start + 2 * period_ - trailer - width) % period_;
         for (std::size_t from = 0; from <= header; ++from) {
           const auto at = checksums_.find({end, trailer + from});
           if (at == checksums_.end() || checksum_bytes(at->second.kind) != width) continue;
-          Checksum sum = at->second;
-          sum.from = from;
-          ends.checksum = &sum;
+          Partly summed = plain;
+          summed.checksum = at->second, summed.from = from, summed.end -= width;
           // That all of a header is covered, or nothing of it, is usual.
-          ends.bits += from == 0 || from == header ? 6 : 10;
-          try_fields(start, ends);
-          ends.bits -= from == 0 || from == header ? 6 : 10;
+          summed.end_bits += from == 0 || from == header ? 6 : 10;
+          try_fields(summed);
         }
       }
     }
   }
 
-  void try_fields(std::size_t start, const Ends& ends) {
-    const std::size_t begin = start + ends.header,
-                      end = start + period_ - ends.trailer -
-                            (ends.checksum != nullptr ? checksum_bytes(ends.checksum->kind) : 0);
-    Parts before, behind;
-    each_before(start, begin, end, ends, before, behind, 0);
-  }
-
-  void each_before(std::size_t start, std::size_t begin, std::size_t end, const Ends& ends, Parts& before,
-                   Parts& behind, double bits) {
-    if (begin >= end || ends.bits + bits > least_ + kMostLead) return;
-    each_behind(start, begin, end, ends, before, behind, bits);
-    if (before.size() == 2 ||
-        (!before.empty() && before.front()->field.is == FrameField::Is::skip && !before.front()->sure))
-      return;
-    for (const FieldFound& field : columns_.fields(begin)) {
-      if (!allowed(field, before)) continue;
-      before.push_back(&field);
-      each_before(start, begin + field.width, end, ends, before, behind, bits + field.bits);
-      before.pop_back();
-    }
-  }
-  void each_behind(std::size_t start, std::size_t begin, std::size_t end, const Ends& ends,
-                   const Parts& before, Parts& behind, double bits) {
-    if (begin >= end || ends.bits + bits > least_ + kMostLead) return;
-    try_values(start, begin, end, ends, before, behind, bits);
-    if (before.size() + behind.size() >= 2) return;
-    for (std::size_t width = 1; width <= 8 && begin + width < end; ++width)
-      for (const FieldFound& field : columns_.fields(end - width)) {
-        if (field.width != width || !allowed(field, before) || !allowed(field, behind)) continue;
-        behind.push_back(&field);
-        each_behind(start, begin, end - width, ends, before, behind, bits + field.bits);
-        behind.pop_back();
-      }
+  void try_fields(const Partly& p) {
+    if (p.begin >= p.end || p.end_bits + p.field_bits > least_ + kMostLead) return;
+    try_values(p);
+    if (p.all == p.found.size()) return;
+    for (std::size_t width = 1; width <= 8 && p.begin + width < p.end; ++width)
+      for (const FieldFound& field : columns_.fields(p.end - width))
+        if (field.width == width && allowed(field, p)) try_fields(p.with(field, false));
+    if (p.all > p.before || (p.all > 0 && p.found[0]->unknown())) return;
+    for (const FieldFound& field : columns_.fields(p.begin))
+      if (allowed(field, p)) try_fields(p.with(field, true));
   }
   // One clock; bytes of no meaning once; and in long periods not at all, for there time counts.
-  bool allowed(const FieldFound& field, const Parts& others) const {
-    const bool unknown = field.field.is == FrameField::Is::skip && !field.sure;
-    if (unknown && (period_ > 600 || !others.empty())) return false;
-    return std::ranges::none_of(others, [&](const FieldFound* other) {
-      return (other->field.is == FrameField::Is::skip && field.field.is == FrameField::Is::skip) ||
-             (other->field.is == field.field.is && field.field.is == FrameField::Is::time);
+  bool allowed(const FieldFound& field, const Partly& p) const {
+    if (field.unknown() && (period_ > 600 || p.all > 0)) return false;
+    return std::ranges::none_of(p.fields(), [&](const FieldFound* other) {
+      return other->field.is == field.field.is &&
+             (field.field.is == FrameField::Is::skip || field.field.is == FrameField::Is::time);
     });
   }
 
-  void try_values(std::size_t start, std::size_t begin, std::size_t end, const Ends& ends,
-                  const Parts& before, const Parts& behind, double bits) {
+  void try_values(const Partly& p) {
     for (const BinaryColumns::Values& values : columns_.values()) {
-      if ((end - begin) % values.width != 0) continue;
-      const std::size_t count = (end - begin) / values.width, at = begin % period_;
+      if ((p.end - p.begin) % values.width != 0) continue;
+      const std::size_t count = (p.end - p.begin) / values.width, at = p.begin % period_;
       if (wanted_ && *wanted_ != count) continue;
       if (counts_[count] < 0) counts_[count] = bits_of_count(count);
-      double all = ends.bits + bits + values.bits(at, count) + counts_[count] + bits_of_type(values.type);
+      double all =
+          p.end_bits + p.field_bits + values.bits(at, count) + counts_[count] + bits_of_type(values.type);
       if (!(all < least_ + kMostLead)) continue;
       bool big = values.width > 1 && values.big_endian, little = values.width > 1 && !values.big_endian;
       std::size_t clock = 0;  // two readings of the time are two readings
-      for (const Parts* parts : {&before, &behind})
-        for (const FieldFound* field : *parts) {
-          if (field->field.is == FrameField::Is::time)
-            clock = field->width + (field->big_endian ? 16 : 0) + (parts == &behind ? 32 : 0);
-          if (field->width > 1 && field->field.is != FrameField::Is::skip)
-            (field->big_endian ? big : little) = true;
-        }
+      for (std::size_t k = 0; k < p.all; ++k) {
+        const FieldFound& field = *p.found[k];
+        if (field.field.is == FrameField::Is::time)
+          clock = field.width + (field.big_endian ? 16 : 0) + (k >= p.before ? 32 : 0);
+        if (field.width > 1 && field.field.is != FrameField::Is::skip)
+          (field.big_endian ? big : little) = true;
+      }
       if (big && little) all += kClearLead;  // hardly anybody mixes byte orders
       least_ = std::min(least_, all);
       // Random numbers are no signal. Below 0 there is more than a mark that stands for an error.
@@ -239,20 +231,20 @@ class Search {
                                   (values.type.front() == 'f' ? 2 : std::size_t{is_signed}) + 4 * clock);
       const auto known = best_.find(key);
       if (known != best_.end() && known->second.bits <= all) continue;
-      BinaryReading& found = best_[key] = reading(start, values, count, ends, before, behind, all);
-      found.mixed = big && little, found.sign_unsure = is_signed && !sure;
+      BinaryReading& found = best_[key] = reading(p, values, count);
+      found.bits = all, found.mixed = big && little, found.sign_unsure = is_signed && !sure;
       found.unknown = found.unknown || random;
     }
   }
 
-  BinaryReading reading(std::size_t start, const BinaryColumns::Values& values, std::size_t count,
-                        const Ends& ends, const Parts& before, const Parts& behind, double bits) const {
+  BinaryReading reading(const Partly& p, const BinaryColumns::Values& values, std::size_t count) const {
     BinaryReading r;
+    r.values = count, r.period = period_, r.sent = sent_;
     FrameFormat& f = r.format;
     f.kind = FrameKind::binary;
-    for (std::size_t i = 0; i < ends.header; ++i) f.header += static_cast<char>(columns_.usual(start + i));
-    for (std::size_t i = ends.trailer; i > 0; --i)
-      f.trailer += static_cast<char>(columns_.usual(start + period_ - i));
+    for (std::size_t i = 0; i < p.header; ++i) f.header += static_cast<char>(columns_.usual(p.start + i));
+    for (std::size_t i = p.trailer; i > 0; --i)
+      f.trailer += static_cast<char>(columns_.usual(p.start + period_ - i));
     f.type = values.type, f.big_endian = values.big_endian;
     const auto add = [&](const FieldFound& field) {
       f.fields.push_back(field.field);
@@ -262,19 +254,16 @@ class Search {
       }
       r.unknown = r.unknown || field.field.is == FrameField::Is::skip;
     };
-    for (const FieldFound* field : before) add(*field);
+    for (std::size_t k = 0; k < p.before; ++k) add(*p.found[k]);
     f.fields.push_back({FrameField::Is::values, count, ""});
-    for (auto field = behind.rbegin(); field != behind.rend(); ++field) add(**field);
+    for (std::size_t k = p.all; k-- > p.before;) add(*p.found[k]);
     const bool plain =
         f.fields.size() == 1 || (f.fields.size() == 2 && f.fields[0].is == FrameField::Is::time);
     if (plain) f.fields.clear();
-    if (ends.checksum != nullptr) {
-      f.checksum = ends.checksum->kind;
-      if (ends.checksum->from != ends.header) f.checksum_from = ends.checksum->from;
-      if (checksum_bytes(f.checksum) > 1 && ends.checksum->big_endian != f.big_endian)
-        f.checksum_big_endian = ends.checksum->big_endian;
-    }
-    r.values = count, r.period = period_, r.bits = bits;
+    f.checksum = p.checksum.kind;
+    if (f.checksum != "none" && p.from != p.header) f.checksum_from = p.from;
+    if (checksum_bytes(f.checksum) > 1 && p.checksum.big_endian != f.big_endian)
+      f.checksum_big_endian = p.checksum.big_endian;
     return r;
   }
 
@@ -282,7 +271,7 @@ class Search {
   std::size_t period_;
   std::vector<double> start_bits_, counts_;
   std::optional<std::size_t> wanted_;
-  double outside_ = 0, least_ = kNever;
+  double sent_, outside_, least_ = kNever;
   std::map<std::pair<std::size_t, std::size_t>, Checksum> checksums_;
   std::map<std::tuple<std::size_t, std::size_t, std::size_t, bool, std::size_t>, BinaryReading> best_;
 };
@@ -290,12 +279,11 @@ class Search {
 // Readings of the bytes, the best first, no two of which give the same numbers. Header (0 to 4 bytes),
 // clock, counter, type, byte order, count, checksum and what it covers, and trailer are found at once, by
 // the length of the bytes' description (binary_columns.h).
-std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::optional<std::size_t> values) {
-  std::string all;
-  for (const Heard& chunk : heard) all += chunk.bytes;
-  const double seconds = heard.empty() ? 0 : heard.back().time_s - heard.front().time_s;
+std::vector<BinaryReading> binary_readings(Bytes all, std::span<const Heard> heard,
+                                           std::optional<std::size_t> values) {
+  const double seconds = heard.back().time_s - heard.front().time_s;
   const std::size_t first = all.size() - std::min(all.size(), std::size_t{1} << 18);
-  const Bytes bytes = Bytes(reinterpret_cast<const unsigned char*>(all.data()), all.size()).subspan(first);
+  const Bytes bytes = all.subspan(first);
   std::vector<BinaryReading> found;
   for (const std::size_t period : periods_of(bytes)) {
     const ByteStretch stretch = stretch_of(bytes, period);
@@ -304,7 +292,6 @@ std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::op
     const BinaryColumns columns(bytes, stretch, seconds < kAtOnceS ? 0 : seconds * share);
     Search(bytes, columns, bits_of_starts(heard, first, stretch, seconds, all.size()), values).run(found);
   }
-  for (BinaryReading& r : found) r.sent = 8.0 * static_cast<double>(bytes.size());
   std::ranges::sort(found, {}, &BinaryReading::bits);
   return found;
 }
@@ -327,18 +314,15 @@ std::string BinaryReading::text() const {
   return text + " (explains " + supertac::format(100 * (1 - bits / sent), 0) + " % of the bytes)";
 }
 
-std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
+std::optional<BinaryReading> find_binary_format(Bytes bytes, std::span<const Heard> heard,
                                                 std::optional<std::size_t> values,
                                                 std::vector<std::string>& says) {
-  std::string all;
-  for (const Heard& chunk : heard) all += chunk.bytes;
-  const Bytes bytes(reinterpret_cast<const unsigned char*>(all.data()), all.size());
   if (const std::string framing = framing_of(bytes); !framing.empty()) {
     says.push_back("frames in " + framing + ", which replaces bytes within them: no sensor's file " +
                    "can say so; let the sensor send frames of one size");
     return std::nullopt;
   }
-  const std::vector<BinaryReading> found = binary_readings(heard, values);
+  const std::vector<BinaryReading> found = binary_readings(bytes, heard, values);
   if (found.empty() || found[0].bits > found[0].sent - kMostLead) {
     says.push_back("binary without a period: a wrong baud rate, an unknown checksum or type, or no sensor");
     return std::nullopt;

@@ -16,23 +16,6 @@
 namespace supertac {
 namespace {
 
-struct Lines {
-  std::vector<std::string> text;  // clean
-  std::vector<std::string> raw;   // empty ones too
-  double seconds = 0;             // from the first to the last
-};
-
-// Whole ones; the first may be torn, or name what follows.
-Lines lines_of(const std::string& bytes, double seconds) {
-  Lines lines{.text = {}, .raw = {}, .seconds = seconds};
-  for (std::size_t at = 0, end; (end = bytes.find('\n', at)) != std::string::npos; at = end + 1) {
-    lines.raw.push_back(bytes.substr(at, end - at));
-    if (std::string clean = clean_line(lines.raw.back()); !clean.empty())
-      lines.text.push_back(std::move(clean));
-  }
-  return lines;
-}
-
 bool from_printer(std::string_view line) {
   for (const char* begin : {"ok", "echo:", "Error:", "start", "//", "!!", "T:", "Grbl"})
     if (line.starts_with(begin)) return true;
@@ -57,20 +40,20 @@ std::optional<FoundFormat> found_by_roles(TextGrammar& grammar, double seconds,
                                           std::vector<std::string>& says) {
   constexpr const char* kNames[] = {"signal", "clock", "counter", "checksum", "signal that never changes",
                                     "label",  "words", "no taxel"};  // by SlotRole::Kind
-  const std::vector<SlotRole> roles = roles_of(grammar, seconds);
+  find_roles(grammar, seconds);
   FoundFormat found{.format = grammar.format, .array = {}, .remark = {}};
   std::vector<std::pair<std::string, std::vector<int>>> said;
   std::size_t values = 0;
   std::map<std::size_t, std::size_t> rows;  // the values in each line of a frame
-  for (std::size_t c = 0; c < roles.size(); ++c) {
-    const int column = static_cast<int>(c);
-    const SlotRole& role = roles[c];
+  for (int column = 0; column < std::ssize(grammar.slots); ++column) {
+    const FoundSlot& slot = grammar.slots[static_cast<std::size_t>(column)];
+    const SlotRole& role = slot.role;
     if (role.kind == SlotRole::clock && role.unit_s > 0 && !found.format.time)
       found.format.time = FrameTime{.column = column, .unit_s = role.unit_s};
     else if (role.kind != SlotRole::signal && role.kind != SlotRole::constant)
       found.format.skip.push_back(column);
-    else if (++values, ++rows[c < grammar.line.size() ? grammar.line[c] : 0];
-             std::ranges::all_of(grammar.columns[c], [](double v) { return std::isnan(v); }))
+    else if (++values, ++rows[slot.line];
+             std::ranges::all_of(slot.column, [](double v) { return std::isnan(v); }))
       found.dead.push_back(static_cast<int>(values) - 1);
     const std::string what = std::string(kNames[role.kind]) + ": " + role.why;
     const auto known = std::ranges::find(said, what, [](const auto& s) { return s.first; });
@@ -111,11 +94,14 @@ void sizes_of(const nlohmann::ordered_json& json, std::vector<std::size_t>& nest
   sizes_of(json.front(), nested);
 }
 
-std::optional<FoundFormat> objects_of(const Lines& lines, std::vector<std::string>& says) {
+// Counts the lines that are `objects`.
+std::optional<FoundFormat> objects_of(const std::vector<std::string>& lines, double seconds,
+                                      std::size_t& objects, std::vector<std::string>& says) {
   std::map<std::string, std::vector<double>> scalars;
-  std::map<std::string, std::vector<std::vector<double>>> arrays;
+  std::map<std::string, std::vector<std::vector<float>>> arrays;
   std::vector<std::size_t> nested;
-  FoundFormat candidate{.format = {.kind = FrameKind::json}, .array = {}, .remark = {}};
+  FoundFormat found{.format = {.kind = FrameKind::json}, .array = {}, .remark = {}};
+  std::string& values = found.format.values;
   std::size_t most = 0, parsed = 0, stamped = 0;
   using Pointer = nlohmann::ordered_json::json_pointer;
   const std::function<void(const Pointer&, const nlohmann::ordered_json&)> look =
@@ -128,69 +114,52 @@ std::optional<FoundFormat> objects_of(const Lines& lines, std::vector<std::strin
         std::vector<float> numbers;
         if (value.is_number()) scalars[key].push_back(value.get<double>());
         if (!value.is_array() || !flatten(value, numbers)) return;
-        arrays[key].emplace_back(numbers.begin(), numbers.end());
-        if (numbers.size() <= most) return;
-        most = numbers.size(), candidate.format.values = key, nested.clear();
-        sizes_of(value, nested);
+        if (numbers.size() > most) {
+          most = numbers.size(), values = key, nested.clear();
+          sizes_of(value, nested);
+        }
+        arrays[key].push_back(std::move(numbers));
       };
-  for (const std::string& line : lines.text) try {
+  for (const std::string& line : lines) try {
       const std::string_view content = behind_stamp(line);
       const auto json = parse_json_limited(content);
       if (json.is_structured()) look(Pointer(), json);
-      stamped += content.size() < line.size();
+      stamped += content.size() < line.size(), objects += json.is_object();
       ++parsed;
     } catch (const JsonError&) {  // no line of this kind
     }
   // Of a bare array behind a time of day the columns tell more.
-  if (2 * parsed < lines.text.size() || most == 0 ||
-      (candidate.format.values.empty() && 2 * stamped > parsed))
-    return std::nullopt;
-  // The places of a flat array are slots as well.
-  std::vector<std::vector<double>>& frames = arrays[candidate.format.values];
-  std::erase_if(frames, [&](const auto& frame) { return frame.size() != most; });
-  TextGrammar grammar;
-  grammar.format = candidate.format;
-  grammar.columns.resize(most), grammar.before.resize(most), grammar.sample.resize(most);
-  grammar.decimals.resize(most), grammar.words.resize(most), grammar.wall.resize(most);
-  for (std::size_t c = 0; c < most && nested.size() == 1 && !frames.empty(); ++c)
-    for (const auto& frame : frames) {
-      grammar.columns[c].push_back(frame[c]);
-      grammar.decimals[c] = std::max(grammar.decimals[c], frame[c] == std::round(frame[c]) ? 0 : 1);
-    }
-  std::optional<TaxelArray> array = assumed_array(most, nested);
-  if (nested.size() == 1) {
-    const auto found = found_by_roles(grammar, lines.seconds, says);
-    if (!found) return std::nullopt;
-    candidate = *found, array = found->array;
-    if (found->format.time) {
-      const std::string column = std::to_string(found->format.time->column);
-      const std::string of = candidate.format.values;
-      candidate.format.time->key = (of.empty() || of.starts_with('/') ? of : "/" + of) + "/" + column;
-      candidate.format.skip.push_back(found->format.time->column);
-      candidate.format.time->column = 0;
-    }
-  }
-  if (!array) return std::nullopt;
-  candidate.array = *array;
-  // The clock beside the array rather than another.
+  if (2 * parsed < lines.size() || most == 0 || (values.empty() && 2 * stamped > parsed)) return std::nullopt;
   const auto folder = [](const std::string& key) { return key.substr(0, key.rfind('/') + 1); };
+  if (nested.size() == 1) {  // the places of a flat array are slots as well
+    TextGrammar grammar{
+        .format = found.format, .slots = std::vector<FoundSlot>(most), .says = {}, .doubt = {}};
+    for (const std::vector<float>& frame : arrays[values])
+      for (std::size_t c = 0; c < most && frame.size() == most; ++c) {
+        grammar.slots[c].column.push_back(double{frame[c]});
+        if (frame[c] != std::round(frame[c])) grammar.slots[c].decimals = 1;
+      }
+    const auto by_roles = found_by_roles(grammar, seconds, says);
+    if (!by_roles) return std::nullopt;
+    found = *by_roles;
+    if (std::optional<FrameTime>& time = found.format.time) {
+      time->key = (values.empty() || values.starts_with('/') ? values : "/" + values) + "/" +
+                  std::to_string(time->column);
+      found.format.skip.push_back(std::exchange(time->column, 0));
+    }
+  } else if (const auto array = assumed_array(most, nested)) {
+    found.array = *array;
+  } else {
+    return std::nullopt;
+  }
+  // The clock beside the array rather than another.
   for (const auto& [key, stamps] : scalars) {
-    const auto unit = stamps.size() == parsed ? unit_of_clock(stamps, lines.seconds) : std::nullopt;
-    const bool beside = folder(key) == folder(candidate.format.values);
-    if (!unit || (candidate.format.time &&
-                  (!beside || folder(candidate.format.time->key) == folder(candidate.format.values))))
-      continue;
-    candidate.format.time = FrameTime{.key = key, .unit_s = *unit};
+    const auto unit = stamps.size() == parsed ? unit_of_clock(stamps, seconds) : std::nullopt;
+    const bool beside = folder(key) == folder(values);
+    if (unit && (!found.format.time || (beside && folder(found.format.time->key) != folder(values))))
+      found.format.time = FrameTime{.key = key, .unit_s = *unit};
   }
-  return candidate;
-}
-
-bool is_object(std::string_view line) {
-  try {
-    return parse_json_limited(behind_stamp(line)).is_object();
-  } catch (const JsonError&) {
-    return false;
-  }
+  return found;
 }
 
 }  // namespace
@@ -212,29 +181,33 @@ std::optional<TaxelArray> assumed_array(std::size_t values, std::span<const std:
 
 std::optional<FoundFormat> find_text_format(const std::string& bytes, double seconds,
                                             std::vector<std::string>& says) {
-  const Lines lines = lines_of(bytes, seconds);
-  if (lines.text.size() < 3) {
-    says.push_back(bytes.find('\n') == std::string::npos
-                       ? "no line ends in this text: a sensor ends each frame with a line feed"
-                       : "too few lines; probe for longer (--seconds)");
+  std::vector<std::string> raw, lines;  // whole ones; the first may be torn, or name what follows
+  for (std::size_t at = 0, end; (end = bytes.find('\n', at)) != std::string::npos; at = end + 1) {
+    raw.push_back(bytes.substr(at, end - at));
+    if (std::string clean = clean_line(raw.back()); !clean.empty()) lines.push_back(std::move(clean));
+  }
+  if (lines.size() < 3) {
+    says.push_back(raw.empty() ? "no line ends in this text: a sensor ends each frame with a line feed"
+                               : "too few lines; probe for longer (--seconds)");
     return std::nullopt;
   }
-  says.push_back(std::to_string(lines.text.size()) + " lines, such as " +
-                 in_quotes(lines.text[lines.text.size() / 2].substr(0, 60)));
-  if (2 * static_cast<std::size_t>(std::ranges::count_if(lines.text, from_printer)) > lines.text.size()) {
+  says.push_back(std::to_string(lines.size()) + " lines, such as " +
+                 in_quotes(lines[lines.size() / 2].substr(0, 60)));
+  if (2 * std::ranges::count_if(lines, from_printer) > std::ssize(lines)) {
     says.push_back("a printer's firmware answers here; choose the sensor's port (supertac-check machine)");
     return std::nullopt;
   }
   const std::size_t before = says.size();
-  auto found = objects_of(lines, says);
-  if (!found && 2 * std::ranges::count_if(lines.text, is_object) > std::ssize(lines.text)) {
+  std::size_t objects = 0;
+  auto found = objects_of(lines, seconds, objects, says);
+  if (!found && 2 * objects > lines.size()) {
     says.push_back(
         "objects of JSON without an array of numbers that makes rows and columns: the sensor has to send "
         "its taxels as one, such as {\"values\": [1, 2, 3, 4]}");
     return std::nullopt;
   }
-  if (auto grammar = found ? std::nullopt : find_grammar(lines.raw))
-    found = found_by_roles(*grammar, lines.seconds, says);
+  if (auto grammar = found ? std::nullopt : find_grammar(raw))
+    found = found_by_roles(*grammar, seconds, says);
   if (!found && says.size() == before)
     says.push_back(
         "a log, or words: no columns of numbers, and no JSON; choose the sensor's port, or its firmware");

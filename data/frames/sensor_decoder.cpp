@@ -16,10 +16,16 @@
 namespace supertac {
 namespace {
 
-/// Cuts the stream into lines; one that is too long to be a frame is thrown away as it comes.
+/// What stands at a key, or at a JSON Pointer (RFC 6901) such as "/finger/taxels". Throws where nothing does.
+const nlohmann::ordered_json& at(const nlohmann::ordered_json& json, const std::string& key) {
+  return key.starts_with('/') ? json.at(nlohmann::ordered_json::json_pointer(key)) : json.at(key);
+}
+
+/// Cuts the stream into lines of text or JSON; one that is too long to be a frame is thrown away as it comes.
 class LineDecoder : public SensorDecoder {
  public:
-  explicit LineDecoder(const Sensor& sensor) : format_(sensor.frame), count_(sensor.values()) {
+  explicit LineDecoder(const Sensor& sensor)
+      : format_(sensor.frame), count_(sensor.values()), lines_(sensor.frame) {
     std::ranges::sort(format_.skip);
     longest_ = 4096 + 64 * (count_ + format_.skip.size());  // names and marks, and what a number takes
   }
@@ -35,9 +41,11 @@ class LineDecoder : public SensorDecoder {
       const std::size_t size = line_.size() + overlong_;
       DecodedFrame frame;
       values_.clear();
-      Line what = overlong_ > 0 ? Line::torn : read(line_, frame);
+      Line what = overlong_ > 0                     ? Line::torn
+                  : format_.kind == FrameKind::json ? read_json(frame)
+                                                    : read_text(frame);
       if (what == Line::frame && values_.size() != count_) what = Line::torn;
-      pending_ = what == Line::part ? pending_ + size + 1 : what == Line::torn ? pending_ : 0;
+      pending_ = what == Line::nothing ? pending_ + size + 1 : what == Line::torn ? pending_ : 0;
       if (what == Line::frame) {
         ++counters_.frames;
         frame.values = values_;
@@ -50,29 +58,11 @@ class LineDecoder : public SensorDecoder {
     }
   }
 
- protected:
-  enum class Line { part, frame, torn };
-  /// Fills values_ and the frame's time.
-  virtual Line read(std::string_view line, DecodedFrame& frame) = 0;
-
-  FrameFormat format_;
-  std::size_t count_;
-  std::vector<float> values_;
-
  private:
-  std::size_t longest_, overlong_ = 0, pending_ = 0;  // bytes; pending_: of lines that may become a frame
-  std::string line_;
-};
-
-class TextDecoder : public LineDecoder {
- public:
-  explicit TextDecoder(const Sensor& sensor) : LineDecoder(sensor), lines_(sensor.frame) {}
-
- private:
-  Line read(std::string_view line, DecodedFrame& frame) override {
-    const auto result = lines_.push(line);
-    if (result != TextFrames::Result::frame)
-      return result == TextFrames::Result::torn ? Line::torn : Line::part;
+  using Line = TextFrames::Result;
+  // Of line_: they fill values_ and the frame's time.
+  Line read_text(DecodedFrame& frame) {
+    if (const Line result = lines_.push(line_); result != Line::frame) return result;
     const std::vector<TextSlot>& slots = lines_.slots();
     if (slots.size() != count_ + format_.skip.size() + (format_.time ? 1 : 0)) return Line::torn;
     for (std::size_t c = 0; c < slots.size(); ++c) {
@@ -86,24 +76,10 @@ class TextDecoder : public LineDecoder {
     }
     return Line::frame;
   }
-
-  TextFrames lines_;
-};
-
-/// What stands at a key, or at a JSON Pointer (RFC 6901) such as "/finger/taxels". Throws where nothing does.
-const nlohmann::ordered_json& at(const nlohmann::ordered_json& json, const std::string& key) {
-  return key.starts_with('/') ? json.at(nlohmann::ordered_json::json_pointer(key)) : json.at(key);
-}
-
-class JsonDecoder : public LineDecoder {
- public:
-  using LineDecoder::LineDecoder;
-
- private:
-  Line read(std::string_view raw, DecodedFrame& frame) override {
-    const std::string clean = clean_line(raw);
+  Line read_json(DecodedFrame& frame) {
+    const std::string clean = clean_line(line_);
     const std::string_view line = behind_stamp(clean);
-    if (line.empty()) return Line::part;
+    if (line.empty()) return Line::nothing;
     if (line.front() != '{' && line.front() != '[') return Line::torn;
     try {
       const auto json = parse_json_limited(line);
@@ -116,6 +92,12 @@ class JsonDecoder : public LineDecoder {
       return Line::torn;
     }
   }
+
+  FrameFormat format_;
+  std::size_t count_, longest_, overlong_ = 0, pending_ = 0;  // pending_: bytes that may become a frame
+  TextFrames lines_;
+  std::string line_;
+  std::vector<float> values_;
 };
 
 }  // namespace
@@ -129,16 +111,8 @@ bool flatten(const nlohmann::ordered_json& json, std::vector<float>& numbers) {
 }
 
 std::unique_ptr<SensorDecoder> make_decoder(const Sensor& sensor) {
-  switch (sensor.frame.kind) {
-    case FrameKind::text:
-      return std::make_unique<TextDecoder>(sensor);
-    case FrameKind::json:
-      return std::make_unique<JsonDecoder>(sensor);
-    case FrameKind::binary:
-      return std::make_unique<BinaryDecoder>(sensor);
-    case FrameKind::board:
-      break;
-  }
+  if (sensor.frame.kind == FrameKind::binary) return std::make_unique<BinaryDecoder>(sensor);
+  if (sensor.frame.kind != FrameKind::board) return std::make_unique<LineDecoder>(sensor);
   return std::make_unique<BoardDecoder>();
 }
 

@@ -93,8 +93,8 @@ double unit_of_step(double step, bool whole) {
 }
 
 bool label_behind(const TextGrammar& grammar, std::size_t slot) {
-  if (slot + 1 >= grammar.before.size() || grammar.format.separator != 0) return false;
-  const std::string behind(trimmed(grammar.before[slot + 1]));
+  if (slot + 1 >= grammar.slots.size() || grammar.format.separator != 0) return false;
+  const std::string_view behind = trimmed(grammar.slots[slot + 1].before);
   return behind.starts_with(':') || behind.starts_with('=') || behind.starts_with("]:") ||
          behind.starts_with("->");
 }
@@ -126,11 +126,11 @@ int neat(std::size_t n) {
 /// Sums and xors of the whole numbers before (and without) the last slot, from one of the first four numbers
 /// on that are no words and no time of day.
 std::string sum_of_values(const TextGrammar& grammar, std::size_t slot) {
-  const auto& stated = grammar.columns[slot];
+  const std::vector<double>& stated = grammar.slots[slot].column;
   if (stated.size() < kFew || !whole(stated) || constant(stated)) return {};
   std::vector<std::size_t> numbers;
   for (std::size_t c = 0; c < slot; ++c)
-    if (!grammar.words[c] && !grammar.wall[c]) numbers.push_back(c);
+    if (!grammar.slots[c].words && !grammar.slots[c].wall) numbers.push_back(c);
   for (std::size_t first = 0; first < std::min<std::size_t>(numbers.size(), 4); ++first)
     for (const double modulus : {0.0, 256.0, 65536.0, 100.0, 1000.0, -1.0}) {
       std::size_t fits = 0;
@@ -138,7 +138,7 @@ std::string sum_of_values(const TextGrammar& grammar, std::size_t slot) {
         double sum = 0;
         std::int64_t crossed = 0;
         for (const std::size_t c : std::span(numbers).subspan(first)) {
-          const double number = grammar.columns[c][i];
+          const double number = grammar.slots[c].column[i];
           if (!std::isfinite(number)) continue;
           sum += number;
           if (std::abs(number) < 1e15) crossed ^= static_cast<std::int64_t>(number);
@@ -158,11 +158,12 @@ std::string sum_of_values(const TextGrammar& grammar, std::size_t slot) {
 
 /// Of slot `c`, by its own numbers; `clock`: there is one already.
 SlotRole role_of(TextGrammar& g, std::size_t c, double seconds, bool clock) {
-  const std::vector<double>& v = g.columns[c];
-  if (g.words[c]) return {SlotRole::words, "no number, such as " + in_quotes(g.sample[c])};
-  if (c >= 2 && c + 2 >= g.columns.size())
+  const FoundSlot& slot = g.slots[c];
+  const std::vector<double>& v = slot.column;
+  if (slot.words) return {SlotRole::words, "no number, such as " + in_quotes(slot.sample)};
+  if (c >= 2 && c + 2 >= g.slots.size())
     if (const std::string sum = sum_of_values(g, c); !sum.empty()) return {SlotRole::checksum, sum};
-  if (g.wall[c]) return {SlotRole::clock, "a time of day or date", 1};
+  if (slot.wall) return {SlotRole::clock, "a time of day or date", 1};
   const bool finite = std::ranges::all_of(v, [](double x) { return std::isfinite(x); });
   const bool live = seconds >= kAtOnceS;
   if (const auto unit = live && finite && !clock ? unit_of_clock(v, seconds) : std::nullopt)
@@ -180,7 +181,7 @@ SlotRole role_of(TextGrammar& g, std::size_t c, double seconds, bool clock) {
     return {SlotRole::label, "never changes, and ':' or '=' stands behind it"};
   if (constant(v))
     return {SlotRole::constant,
-            std::isnan(v[0]) ? "says " + in_quotes(g.sample[c]) + " only" : "is always " + format(v[0])};
+            std::isnan(v[0]) ? "says " + in_quotes(slot.sample) + " only" : "is always " + format(v[0])};
   if (cycles(v))
     g.doubt = "slot " + std::to_string(c) +
               " runs through the same numbers again and again: a row or column that its line belongs to, or "
@@ -192,91 +193,91 @@ SlotRole role_of(TextGrammar& g, std::size_t c, double seconds, bool clock) {
   return {SlotRole::other, "only rises"};
 }
 
-bool candidate(const SlotRole& role) {
-  return role.kind == SlotRole::signal || role.kind == SlotRole::constant;
+bool candidate(const FoundSlot& slot) {
+  return slot.role.kind == SlotRole::signal || slot.role.kind == SlotRole::constant;
 }
-std::vector<std::size_t> candidates(const std::vector<SlotRole>& roles) {
+std::vector<std::size_t> candidates(const TextGrammar& g) {
   std::vector<std::size_t> all;
-  for (std::size_t c = 0; c < roles.size(); ++c)
-    if (candidate(roles[c])) all.push_back(c);
+  for (std::size_t c = 0; c < g.slots.size(); ++c)
+    if (candidate(g.slots[c])) all.push_back(c);
   return all;
 }
 
 /// Numbers that count the rows or the taxels: in turn with others a constant, one more each time.
-void find_counts(const TextGrammar& g, std::vector<SlotRole>& roles) {
-  const std::vector<std::size_t> all = candidates(roles);
+void find_counts(TextGrammar& g) {
+  const std::vector<std::size_t> all = candidates(g);
+  const auto column = [&](std::size_t i) -> const std::vector<double>& { return g.slots[all[i]].column; };
   const std::size_t lines = g.format.lines_per_frame == 2 ? 2 : 3;  // at least
   for (std::size_t width = 2; lines * width <= all.size(); ++width)
     for (std::size_t place = 0; all.size() % width == 0 && place < width; ++place) {
       bool counted = true;
       for (std::size_t i = place; counted && i < all.size(); i += width)
-        counted = constant(g.columns[all[i]]) &&
-                  (i == place || g.columns[all[i]][0] == g.columns[all[i - width]][0] + 1);
+        counted = constant(column(i)) && (i == place || column(i)[0] == column(i - width)[0] + 1);
       for (std::size_t i = place; counted && i < all.size(); i += width)
-        roles[all[i]] = {SlotRole::label, "counts the rows, or the taxels"};
+        g.slots[all[i]].role = {SlotRole::label, "counts the rows, or the taxels"};
     }
 }
 
 /// Numbers named otherwise than most are no taxels of the array. Names that take turns are a taxel's
 /// channels; others of as many numbers each are other quantities, unless they are the letters of the rows.
-void compare_names(TextGrammar& g, std::vector<SlotRole>& roles) {
+void compare_names(TextGrammar& g) {
   std::map<std::string, std::vector<std::size_t>> named;
-  std::vector<std::string> names;  // of the candidates, in turn
   std::string name;
-  for (std::size_t c = 0; c < roles.size(); ++c) {
-    if (!g.names.empty()) {
-      name = stem(g.names[c]);
+  for (std::size_t c = 0; c < g.slots.size(); ++c) {
+    const FoundSlot& slot = g.slots[c];
+    if (!slot.name.empty()) {
+      name = stem(slot.name);
     } else if (g.format.separator != 0) {
-      if (g.words[c] && !stem(g.sample[c]).empty()) name = stem(g.sample[c]);
-    } else if (candidate(roles[c])) {
-      const std::string own = stem(g.before[c]);
-      const bool first = c > 0 && !candidate(roles[c - 1]) && g.format.lines_per_frame == 1;
+      if (slot.words && !stem(slot.sample).empty()) name = stem(slot.sample);
+    } else if (candidate(slot)) {
+      const std::string own = stem(slot.before);
+      const bool first = c > 0 && !candidate(g.slots[c - 1]) && g.format.lines_per_frame == 1;
       if (!own.empty() || first) name = own;
     }
-    if (candidate(roles[c])) named[name].push_back(c);
+    if (candidate(slot)) named[name].push_back(c);
   }
   if (named.size() < 2) return;
-  const auto largest = *std::ranges::max_element(named, {}, [](const auto& e) { return e.second.size(); });
+  const auto count = [](const auto& entry) { return entry.second.size(); };
+  const std::size_t most = count(*std::ranges::max_element(named, {}, count));
   for (const auto& [label, slots] : named)
-    if (4 * slots.size() <= largest.second.size() || (slots.size() == 1 && largest.second.size() >= 4))
+    if (4 * slots.size() <= most || (slots.size() == 1 && most >= 4))
       for (const std::size_t c : slots)
-        roles[c] = {SlotRole::other, "named " + in_quotes(label) + " unlike the others"};
-  std::erase_if(named, [&](const auto& e) { return !candidate(roles[e.second[0]]); });
+        g.slots[c].role = {SlotRole::other, "named " + in_quotes(label) + " unlike the others"};
+  std::erase_if(named, [&](const auto& e) { return !candidate(g.slots[e.second[0]]); });
   if (named.size() < 2) return;
-  const std::size_t kinds = named.size(), each = largest.second.size();
-  bool alike = true, turns = kinds <= 8 && each > 1, rows = true;
+  const std::vector<std::size_t>& begin = named.begin()->second;
+  bool alike = true, turns = named.size() <= 8 && most > 1, rows = true;
   char letter = 'a';
   for (const auto& [label, slots] : named) {
-    alike = alike && slots.size() == each, rows = rows && label.size() == 1 && lower(label[0]) == letter++;
+    alike = alike && slots.size() == most, rows = rows && label.size() == 1 && lower(label[0]) == letter++;
     for (std::size_t i = 1; turns && i < slots.size(); ++i)
       turns = slots[i] == slots[i - 1] + slots[1] - slots[0];
-    turns = turns && slots.back() > named.begin()->second[0] &&
-            slots[0] < named.begin()->second[0] + slots[1] - slots[0];
+    turns = turns && slots.back() > begin[0] && slots[0] < begin[0] + slots[1] - slots[0];
   }
   if (alike && turns && !rows)
-    g.channels = static_cast<int>(kinds);
+    g.channels = static_cast<int>(named.size());
   else if (!alike || !rows)
     g.doubt = "numbers named " + joined(named, " and ", [](const auto& e) { return in_quotes(e.first); }) +
-              ", " + joined(named, " and ", [](const auto& e) { return std::to_string(e.second.size()); }) +
-              " of them: one array, or several quantities";
+              ", " + joined(named, " and ", count) + " of them: one array, or several quantities";
 }
 
 /// Nor are a few that are written with other decimals.
-void compare_decimals(TextGrammar& g, std::vector<SlotRole>& roles) {
-  const std::vector<std::size_t> all = candidates(roles);
+void compare_decimals(TextGrammar& g) {
+  const std::vector<std::size_t> all = candidates(g);
   std::array<std::vector<std::size_t>, 2> pointed;  // without and with decimals
   for (const std::size_t c : all)
-    if (!std::isnan(g.columns[c][0]) || !constant(g.columns[c])) pointed[g.decimals[c] > 0].push_back(c);
+    if (const FoundSlot& slot = g.slots[c]; !std::isnan(slot.column[0]) || !constant(slot.column))
+      pointed[slot.decimals > 0].push_back(c);
   for (const bool which : {false, true}) {
     if (pointed[which].size() > 3 || pointed[!which].size() < 4 * pointed[which].size()) continue;
     for (const std::size_t c : pointed[which]) {
-      if (roles[c].kind == SlotRole::constant && !which) continue;
+      if (g.slots[c].role.kind == SlotRole::constant && !which) continue;
       // At an edge: all before it, or all behind it, are of its kind.
-      const auto alike = [&](std::size_t o) { return (g.decimals[o] > 0) == which; };
+      const auto alike = [&](std::size_t o) { return (g.slots[o].decimals > 0) == which; };
       const auto place = std::ranges::find(all, c);
       if (std::all_of(all.begin(), place, alike) || std::all_of(place, all.end(), alike))
-        roles[c] = {SlotRole::other,
-                    which ? "has decimals, the others have none" : "has no decimals, the others have"};
+        g.slots[c].role = {SlotRole::other,
+                           which ? "has decimals, the others have none" : "has no decimals, the others have"};
       else
         g.doubt = "slot " + std::to_string(c) +
                   (which ? " has decimals, those" : " has no decimals as those") + " beside it " +
@@ -286,9 +287,9 @@ void compare_decimals(TextGrammar& g, std::vector<SlotRole>& roles) {
 }
 
 /// A constant at an edge may be a version, a count or a dead taxel.
-void look_at_edges(TextGrammar& g, std::vector<SlotRole>& roles) {
-  const std::vector<std::size_t> all = candidates(roles);
-  const auto moves = [&](std::size_t c) { return roles[c].kind == SlotRole::signal; };
+void look_at_edges(TextGrammar& g) {
+  const std::vector<std::size_t> all = candidates(g);
+  const auto moves = [&](std::size_t c) { return g.slots[c].role.kind == SlotRole::signal; };
   const auto first = std::ranges::find_if(all, moves);
   const auto last = std::find_if(all.rbegin(), std::make_reverse_iterator(first), moves).base();
   const auto lead = static_cast<std::size_t>(first - all.begin()),
@@ -299,7 +300,8 @@ void look_at_edges(TextGrammar& g, std::vector<SlotRole>& roles) {
   for (std::size_t a = 0; a <= lead; ++a)
     for (std::size_t b = 0; b <= trail; ++b) {
       const std::size_t values = all.size() - a - b;
-      const bool counted = a > 0 && g.columns[all[a - 1]][0] == static_cast<double>(values) && values > 4;
+      const bool counted =
+          a > 0 && g.slots[all[a - 1]].column[0] == static_cast<double>(values) && values > 4;
       const int good = counted ? 4 : neat(values);
       if (good > best) best = good, ways.clear();
       if (good == best) ways.emplace_back(a, b);
@@ -309,9 +311,10 @@ void look_at_edges(TextGrammar& g, std::vector<SlotRole>& roles) {
   if (ways.size() > 1 && best < (before + behind == 0 ? 3 : 4))
     g.doubt =
         "constants at the edge may be taxels or not: " + left(ways[0]) + " or " + left(ways[1]) + " values";
-  for (std::size_t i = 0; i < before; ++i) roles[all[i]] = {SlotRole::other, "constant before the array"};
+  for (std::size_t i = 0; i < before; ++i)
+    g.slots[all[i]].role = {SlotRole::other, "constant before the array"};
   for (std::size_t i = all.size() - behind; i < all.size(); ++i)
-    roles[all[i]] = {SlotRole::other, "constant behind the array"};
+    g.slots[all[i]].role = {SlotRole::other, "constant behind the array"};
 }
 
 }  // namespace
@@ -343,24 +346,25 @@ std::optional<double> unit_of_clock(std::span<const double> stamps, double secon
   return std::nullopt;
 }
 
-std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
-  std::vector<SlotRole> roles;
+void find_roles(TextGrammar& g, double seconds) {
   bool clock = false;
-  for (std::size_t c = 0; c < g.columns.size(); ++c) {
-    roles.push_back(role_of(g, c, seconds, clock));
-    clock = clock || (roles[c].kind == SlotRole::clock && roles[c].unit_s > 0);
+  std::ptrdiff_t clocks = 0;
+  for (std::size_t c = 0; c < g.slots.size(); ++c) {
+    const SlotRole& role = g.slots[c].role = role_of(g, c, seconds, clock);
+    clocks += role.kind == SlotRole::clock;
+    clock = clock || (role.kind == SlotRole::clock && role.unit_s > 0);
   }
-  if (const auto clocks = std::ranges::count(roles, SlotRole::clock, &SlotRole::kind); clocks > 2)
+  if (clocks > 2)
     g.doubt =
         std::to_string(clocks) + " slots rise steadily: clocks, or signals that drift; listen for longer";
-  find_counts(g, roles);
-  if (candidates(roles).empty()) return roles;
-  compare_names(g, roles);
-  compare_decimals(g, roles);
-  look_at_edges(g, roles);
-  const std::size_t values = candidates(roles).size();
-  for (std::size_t c = 0; c < roles.size() && values == 1; ++c)
-    if (roles[c].kind == SlotRole::counter && cycles(g.columns[c]))
+  find_counts(g);
+  if (candidates(g).empty()) return;
+  compare_names(g);
+  compare_decimals(g);
+  look_at_edges(g);
+  const std::size_t values = candidates(g).size();
+  for (std::size_t c = 0; c < g.slots.size() && values == 1; ++c)
+    if (g.slots[c].role.kind == SlotRole::counter && cycles(g.slots[c].column))
       g.doubt = "slot " + std::to_string(c) +
                 " runs through the same numbers again and again beside one value: the taxel that a line is "
                 "of, or a counter";
@@ -371,10 +375,9 @@ std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
                   std::to_string(values - less) + " and " + std::to_string(less) + " of another kind";
   // Lines of different counts may be different quantities.
   const auto lines = static_cast<std::size_t>(g.format.lines_per_frame);
-  if (lines > 1 && roles.size() % lines != 0 && values < 16 && g.doubt.empty())
+  if (lines > 1 && g.slots.size() % lines != 0 && values < 16 && g.doubt.empty())
     g.doubt = "a frame of " + std::to_string(lines) + " lines with different counts of numbers, " +
               std::to_string(values) + " in all: they may be different quantities";
-  return roles;
 }
 
 }  // namespace supertac

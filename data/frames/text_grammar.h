@@ -89,27 +89,32 @@ struct SlotRole {
   double unit_s = 0;  ///< of a clock; 0: not known
 };
 
+/// A slot in all frames.
+struct FoundSlot {
+  std::vector<double> column;        ///< what stands there in each frame
+  std::string before, sample, name;  ///< template before it, how it is written; from a line of words
+  std::size_t line = 0;              ///< of its frame
+  int decimals = 0;                  ///< behind the point, at most
+  bool words = false, wall = false;  ///< as of TextSlot
+  SlotRole role;
+};
+
 /// What was found in lines, of which the first and the last may be torn.
 struct TextGrammar {
-  FrameFormat format;                        ///< of kind text, without time and skip
-  std::vector<std::vector<double>> columns;  ///< [slot][frame]
-  std::vector<std::string> before, sample;   ///< of each slot: template before it, how it is written
-  std::vector<std::string> names;            ///< of each slot, from a line of words; empty: there is none
-  std::vector<std::size_t> line;             ///< of each slot, in its frame
-  int channels = 1;                          ///< that names tell apart, of each taxel in turn
-  std::vector<int> decimals;                 ///< behind the point, at most; of each slot
-  std::vector<bool> words, wall;             ///< of each slot
+  FrameFormat format;  ///< without time and skip
+  std::vector<FoundSlot> slots;
+  int channels = 1;  ///< that names tell apart, of each taxel in turn
   std::vector<std::string> says;
   std::string doubt;  ///< two readings that explain the same; empty where there is one
 };
 /// Reading, period and slots; empty where no reading explains half of the lines.
 std::optional<TextGrammar> find_grammar(const std::vector<std::string>& lines);
 
-/// The roles of all slots. `seconds`: for how long the lines came; less than kAtOnceS: all at once, as from a
-/// file. Clocks rise at a steady rate, also modulo 2^16 and 2^32; counters rise by one, also modulo; a
+/// Finds the roles of all slots. `seconds`: for how long the lines came; less than kAtOnceS: all at once, as
+/// from a file. Clocks rise at a steady rate, also modulo 2^16 and 2^32; counters rise by one, also modulo; a
 /// checksum is the sum or xor of the numbers before it; a constant at an edge is no taxel when the rest makes
 /// a better array; the others are signals. A doubt is added to `grammar`.
-std::vector<SlotRole> roles_of(TextGrammar& grammar, double seconds);
+void find_roles(TextGrammar& grammar, double seconds);
 
 /// The unit (s) of a column of stamps, from how far it went in `seconds`: 1, 1e-3 or 1e-6; empty when it is
 /// no clock. For bytes that came at once, as from a file: milliseconds where all are whole, else seconds.

@@ -155,7 +155,7 @@ Table text_table(const std::string& path) {
   if (!grammar) throw FileError(path, other_than_table(whole, learnt));
   if (!grammar->doubt.empty()) throw FileError(path, "two readings explain it alike: " + grammar->doubt);
   Table table;
-  table.columns = grammar->columns.size(), table.shape = {table.columns};
+  table.columns = grammar->slots.size(), table.shape = {table.columns};
   const FrameFormat& format = grammar->format;
   TextFrames frames(format);
   std::size_t number = 0, lines = 0;
@@ -168,7 +168,7 @@ Table text_table(const std::string& path) {
     ++lines;
     const auto& slots = frames.slots();
     bool fits = result == TextFrames::Result::frame && slots.size() == table.columns;
-    for (std::size_t c = 0; fits && c < slots.size(); ++c) fits = slots[c].words == grammar->words[c];
+    for (std::size_t c = 0; fits && c < slots.size(); ++c) fits = slots[c].words == grammar->slots[c].words;
     if (fits) {
       for (const TextSlot& slot : slots) table.values.push_back(slot.value);
       table.lines.push_back(number), table.places.push_back(lines);
