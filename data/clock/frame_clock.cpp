@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "io/numbers/median.h"
 
@@ -32,11 +31,10 @@ FrameClock::FrameClock(const ClockSettings& settings)
       measured_s_(settings.period_s),
       stamps_(settings) {}
 
-void FrameClock::keep_low(std::size_t at) {
-  const double level_s = level(window_[at]);
-  while (!lows_.empty() && (lows_.back().burst == closed_ || lows_.back().level_s >= level_s))
-    lows_.pop_back();
-  lows_.push_back({closed_, level_s, window_[at].last});
+// Of equal ones the newest.
+const ReadEnd& FrameClock::lowest() const {
+  return *std::ranges::min_element(window_.rbegin(), window_.rend(), {},
+                                   [this](const ReadEnd& burst) { return level(burst); });
 }
 
 // By so much (s) the earliest of the last reads may have been late.
@@ -48,13 +46,10 @@ void FrameClock::take(double first, double last, double time_s) {
   const bool joins = !window_.empty() && (time_s == window_.back().time_s ||
                                           waited_before(last - window_.back().last,
                                                         time_s - window_.back().time_s, shortest(rate_)));
-  if (joins) {
+  if (joins)
     window_.back().last = last, window_.back().time_s = time_s;
-  } else {
+  else
     window_.push_back({first, last, time_s, window_.empty() ? 0 : time_s - window_.back().time_s});
-    ++closed_;
-  }
-  keep_low(window_.size() - 1);
   const double span = span_s(late_.jitter_s, settings_.stamp_unit_s);
   while (window_.size() > kReads + 1 && time_s - window_[1].time_s >= span) drop_front();
   count_lost();
@@ -63,7 +58,6 @@ void FrameClock::take(double first, double last, double time_s) {
 void FrameClock::drop_front() {
   const ReadEnd burst = window_.front();
   window_.pop_front();
-  if (lows_.front().burst == closed_ - window_.size()) lows_.pop_front();
   ends_.push_back(burst);
   ends_.back().first += static_cast<double>(lost_), ends_.back().last += static_cast<double>(lost_);
   if (++ended_ % kReads == 0) learn();
@@ -87,14 +81,15 @@ double FrameClock::periods_lost() const {
 
 // The envelope stays late by whole periods: frames were lost; unless it comes back.
 void FrameClock::count_lost() {
-  if (lows_.empty()) return;
-  const double low_s = lows_.front().level_s, rise = low_s - level_s_, period = rate_.period_s;
+  if (window_.empty()) return;
+  const ReadEnd low = lowest();
+  const double low_s = level(low), rise = low_s - level_s_, period = rate_.period_s;
   // Until it is known how late frames come, what a known rate has lost is put off.
   if (levelled_ && rise > 0 && !late_.known && settings_.tolerance < kKnown) return;
   if (levelled_ && rise > 0.5 * period) lost_ += static_cast<std::uint64_t>(periods_lost());
   if (levelled_ && rise < -0.5 * period)
     lost_ -= std::min(lost_, static_cast<std::uint64_t>(std::lround(-rise / period)));
-  level_s_ = low_s, level_last_ = lows_.front().last, levelled_ = true;
+  level_s_ = low_s, level_last_ = low.last, levelled_ = true;
 }
 
 void FrameClock::learn() {
@@ -117,17 +112,12 @@ void FrameClock::learn() {
   rate_.period_s = found.period_s;
   // What was the median of levels by quite another period is none by this.
   if (settings_.stamp_unit_s > 0 && differs > 0.25) window_.clear();
-  lows_.clear();
-  const std::uint64_t closed = std::exchange(closed_, closed_ - window_.size());
-  for (std::size_t at = 0; at < window_.size(); ++at) ++closed_, keep_low(at);
-  closed_ = closed;
   levelled_ = false;
 }
 
 void FrameClock::finish() {
   while (window_.size() > 1) {
     window_.pop_front();
-    if (lows_.front().burst == closed_ - window_.size()) lows_.pop_front();
     count_lost();
   }
 }
@@ -160,7 +150,7 @@ void FrameClock::date(std::span<const FrameArrival> frames, std::vector<FrameDat
   // What came before this read, that one at least of it was on time. By the rate that was known then.
   const double period = rate_.period_s;
   const double drift = rate_.uncertain * rate_.period_s, front = first_ ? 0 : window_.front().last;
-  const double low_s = first_ ? -kNever : lows_.front().level_s - jitter_s();
+  const double low_s = first_ ? -kNever : level(lowest()) - jitter_s();
   take(first, last, time_s);
   const double least = shortest(rate_), waited_s = late_.known ? late_.waited_s : 2 * kOldestS;
   for (const FrameArrival& frame : frames) {
@@ -198,7 +188,7 @@ FrameDate FrameClock::by_stamp(const FrameArrival& frame) {
   if (!reading.time_s && first_) return dated(0, -kMostStampS, kMostStampS);
   if (!reading.time_s) return dated(due, last_.from_s, std::max(due + unit, farthest_s));
   resets_ += reading.reset ? 1 : 0;
-  if (reading.anew) window_.clear(), lows_.clear(), stamped_.clear(), levelled_ = false;
+  if (reading.anew) window_.clear(), stamped_.clear(), levelled_ = false;
   const double stamp_s = *reading.time_s, longest = period * (1 + rate_.uncertain);
   const double least_s = first_ || reading.anew ? stamp_s - unit - std::abs(stamp_s - believed_s_)
                                                 : last_.from_s + shortest(rate_) * step;

@@ -79,15 +79,11 @@ class FrameClock {
   double period_s() const { return measured_s_; }
 
  private:
-  struct Low {
-    std::uint64_t burst;
-    double level_s, last;
-  };
   double level(const ReadEnd& burst) const { return burst.time_s - rate_.period_s * burst.last; }
   double jitter_s() const;
   void take(double first, double last, double time_s);
   void drop_front();
-  void keep_low(std::size_t at);
+  const ReadEnd& lowest() const;
   double periods_lost() const;
   void count_lost();
   void learn();
@@ -100,9 +96,8 @@ class FrameClock {
   double measured_s_;
   DeviceStamps stamps_;
   std::deque<ReadEnd> window_;  // the newest bursts: frames that came in one read, or waited for one
-  std::deque<Low> lows_;        // of window_: rising levels, the lowest in front
   std::vector<ReadEnd> ends_;   // bursts that have left it, for the rate
-  std::uint64_t closed_ = 0, ended_ = 0, lost_ = 0, damaged_ = 0, resets_ = 0;
+  std::uint64_t ended_ = 0, lost_ = 0, damaged_ = 0, resets_ = 0;
   double number_ = 0, believed_s_ = 0, arrived_s_ = 0;
   double level_s_ = 0, level_last_ = 0;
   Lateness late_;

@@ -194,37 +194,31 @@ void BinaryColumns::find_values() {
       const std::size_t width = bytes_of(type);
       if ((width == 1 && big) || width > period) continue;
       Values v{type, big, width};
-      std::vector<Column> columns(period);
-      for (std::size_t c = 0; c < period; ++c) {
-        columns[c] = read(type, width, c, big);
-        v.high.push_back(columns[c].high), v.highs.push_back(columns[c].highs || columns[c].still);
-        v.alone.push_back(columns[c].alone);
-        v.random.push_back(columns[c].steps > static_cast<double>(8 * width * steps_));
-      }
+      std::vector<Column> columns;
+      for (std::size_t c = 0; c < period; ++c) columns.push_back(read(type, width, c, big));
       for (std::size_t c = 0; c < 2 * period; ++c) {
         const Column &here = columns[c % period], &before = columns[(c + period - width) % period];
-        v.moves.push_back(here.steps + here.size + (c >= width ? v.moves[c - width] : 0));
-        v.still.push_back((here.still ? 1 : 0) + (c >= width ? v.still[c - width] : 0));
-        v.apart.push_back(c >= width ? v.apart[c - width] : std::array<std::uint16_t, kClasses>{});
-        const auto away = static_cast<std::uint64_t>(std::abs(here.middle - before.middle));
-        ++v.apart.back()[static_cast<std::size_t>(std::bit_width(away))];
+        Place place = c >= width ? v.places[c - width] : Place{};
+        place.alone = here.alone, place.moves += here.steps + here.size, place.still += here.still ? 1 : 0;
+        ++place.apart[std::bit_width(static_cast<std::uint64_t>(std::abs(here.middle - before.middle)))];
+        place.random = here.steps > static_cast<double>(8 * width * steps_);
+        place.high = here.high, place.highs = here.highs || here.still;
+        v.places.push_back(place);
       }
       values_.push_back(std::move(v));
     }
 }
 
 double BinaryColumns::Values::bits(std::size_t at, std::size_t count) const {
-  const std::size_t end = at + (count - 1) * width;
-  const auto sum_of = [&](const std::vector<double>& sums) {
-    return sums[end] - (at >= width ? sums[at - width] : 0);
-  };
+  const Place &first = places[at], &last = places[at + (count - 1) * width];
+  const Place before = at >= width ? places[at - width] : Place{};
   Classes classes{};
   for (std::size_t c = 0; c < kClasses; ++c)
-    classes[c] = static_cast<std::size_t>(apart[end][c] - apart[at][c]);
+    classes[c] = static_cast<std::size_t>(last.apart[c] - first.apart[c]);
+  const double still = last.still - before.still;
   // One in the middle is told first, and from it the others, for what stands at an edge may be no value.
-  return alone[(at + count / 2 * width) % alone.size()] + sum_of(moves) +
-         bits_of_classes(classes, count - 1) +
-         bits_of_share(sum_of(still), static_cast<double>(count) - sum_of(still));
+  return places[at + count / 2 * width].alone + (last.moves - before.moves) +
+         bits_of_classes(classes, count - 1) + bits_of_share(still, static_cast<double>(count) - still);
 }
 
 void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_endian, double seconds,

@@ -67,20 +67,22 @@ class BinaryColumns {
   /// `seconds`: what the stretch took, 0 where it came at once.
   BinaryColumns(Bytes bytes, const ByteStretch& stretch, double seconds);
 
-  /// As values of one type, from every byte of the period on.
+  /// A value that begins at a byte of the period, or of the one behind it.
+  struct Place {
+    double alone = 0;  ///< cost of where it rests, of which no other is known
+    /// Cost of the steps in time, values that never move, and counts of how far values rest from those before
+    /// them, by classes: sums of all places a width apart up to this one.
+    double moves = 0, still = 0;
+    std::array<std::uint16_t, kClasses> apart = {};
+    bool random = false;               ///< its steps take more bits than its bytes: no signal
+    bool high = false, highs = false;  ///< its highest bit is set at times; in several numbers
+  };
+  /// As values of one type.
   struct Values {
     std::string type;
     bool big_endian = false;
     std::size_t width = 0;
-    std::vector<double> alone = {};  ///< [period] cost of where a value rests, of which no other is known
-    std::vector<double> moves = {};  ///< [2 period] cost of the steps in time, summed in steps of width
-    std::vector<double> still = {};  ///< [2 period] values that never move, summed likewise
-    /// [2 period] how far values rest from those before them, as counts of classes, summed likewise.
-    std::vector<std::array<std::uint16_t, kClasses>> apart = {};
-    /// [period] its steps take more bits than its bytes: no signal.
-    std::vector<bool> random = {};
-    std::vector<bool> high = {},
-                      highs = {};  ///< [period] its highest bit is set at times; in several numbers
+    std::vector<Place> places = {};  ///< [2 period]
     /// Cost of `count` values from byte `at`, below the period, on: and of how many of them never move.
     double bits(std::size_t at, std::size_t count) const;
   };

@@ -11,7 +11,6 @@
 #include "data/frames/binary_columns.h"
 #include "data/frames/sensor_decoder.h"
 #include "data/frames/text_grammar.h"
-#include "data/sensors/layout.h"
 #include "data/sensors/rest_tracker.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
@@ -174,16 +173,6 @@ double peak_of(const HeardFrames& frames, const Sensor& sensor, std::size_t taxe
   return peak > 6 * quantile(steps, 0.75) ? peak : 0;
 }
 
-// Who lies beside whom, from how far each taxel is from rest.
-FoundLayout layout_of(const HeardFrames& frames) {
-  std::vector<std::vector<float>> felt = frames.signals;
-  for (std::vector<float>& signal : felt) {
-    const float rest = median(std::vector(signal));
-    for (float& value : signal) value -= rest;
-  }
-  return find_layout(felt);
-}
-
 }  // namespace
 
 ProbeReport probe(std::span<const Heard> heard, const std::string& port, const std::optional<Sensor>& known) {
@@ -236,7 +225,7 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   if (unknown_rate)
     report.says.push_back("assumed: " + format(draft.rate_hz) + " frames a second; set \"rate_hz\"");
   const bool nested = found->array != assumed_array(values);  // by lists of JSON, or rows of lines
-  if (const FoundLayout lie = known || nested ? FoundLayout{} : layout_of(frames); lie.layout) {
+  if (const FoundLayout lie = known || nested ? FoundLayout{} : find_layout(frames.signals); lie.layout) {
     draft.array.rows = lie.layout->rows, draft.array.columns = lie.layout->columns;
     draft.reorder(lie.layout->order);
     frames = frames_of(draft, heard);

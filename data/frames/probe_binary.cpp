@@ -222,9 +222,9 @@ class Search {
       // Random numbers are no signal. Below 0 there is more than a mark that stands for an error.
       bool random = false, is_signed = false, sure = false;
       for (std::size_t k = 0; k < count; ++k) {
-        const std::size_t column = (at + k * values.width) % period_;
-        random = random || values.random[column], is_signed = is_signed || values.high[column];
-        sure = sure || (values.high[column] && values.highs[column]);
+        const BinaryColumns::Place& place = values.places[at + k * values.width];
+        random = random || place.random, is_signed = is_signed || place.high;
+        sure = sure || (place.high && place.highs);
       }
       is_signed = is_signed && values.type.front() == 'i';
       const auto key = std::tuple(at, count, values.width, values.width > 1 && values.big_endian,

@@ -1,9 +1,9 @@
-#include "data/sensors/body.h"
-
+// How an array is built: what a touch goes through on its way to the signals.
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include "data/sensors/sensor.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/same_bits.h"

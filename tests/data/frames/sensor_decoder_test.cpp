@@ -4,6 +4,7 @@
 
 #include "data/frames/binary_decoder.h"
 #include "tests/hardware/fake_sensor.h"
+#include "tests/hardware/rig_support.h"
 #include "tests/support/test.h"
 
 namespace supertac::sensor_decoder_test {
@@ -17,6 +18,7 @@ Sensor sensor_with(const std::string& array, const std::string& frame) {
 std::map<std::string, Sensor> sensors() {
   const std::string mat = R"("rows":4,"columns":5)", skin = R"("rows":4,"columns":4,"channels":3)";
   return {
+      {"board", Sensor{}},
       {"commas", sensor_with(mat, R"({"kind":"text"})")},
       {"blanks",
        sensor_with(mat, R"({"kind":"text","separator":" ","skip":[1,3],"time":{"column":0,"unit":"ms"}})")},
@@ -44,10 +46,21 @@ std::map<std::string, Sensor> sensors() {
 
 std::vector<double> values_of(const Sensor& sensor, unsigned frame) {
   std::mt19937 random(frame);
-  const unsigned codes = sensor.frame.type == "u8" ? 256 : sensor.frame.type == "i8" ? 128 : 1000;
+  const FrameFormat& f = sensor.frame;
+  const unsigned codes = f.type == "u8" ? 256 : f.type == "i8" ? 128 : 1000;
+  const float unit = f.kind == FrameKind::board ? static_cast<float>(rig::volts_of(1)) : 1;
   std::vector<double> values;
-  for (std::size_t i = 0; i < sensor.values(); ++i) values.push_back(random() % codes);
+  for (std::size_t i = 0; i < sensor.values(); ++i)
+    values.push_back(double{static_cast<float>(random() % codes) * unit});
   return values;
+}
+
+std::string sent(const Sensor& sensor, std::span<const double> values, double time_s = 0) {
+  if (sensor.frame.kind != FrameKind::board) return sent_frame(sensor, values, time_s);
+  BoardFrame frame = random_frame(1);
+  for (std::size_t k = 0; k < values.size(); ++k)
+    frame.samples[rig::kPatches * k] = static_cast<std::uint16_t>(rig::adc_of(values[k]));
+  return as_text(frame_bytes(frame));
 }
 
 struct Decoded {
@@ -73,7 +86,7 @@ TEST(SensorDecoder, ReadsEveryKindInPiecesOfAnySize) {
   for (const auto& [name, sensor] : sensors()) {
     SCOPED_TRACE(name);
     std::string bytes;
-    for (unsigned n = 0; n < 20; ++n) bytes += sent_frame(sensor, values_of(sensor, n), 0.01 * n);
+    for (unsigned n = 0; n < 20; ++n) bytes += sent(sensor, values_of(sensor, n), 0.01 * n);
     for (const std::size_t piece : {std::size_t{1}, std::size_t{7}, std::size_t{100'000}}) {
       const Decoded decoded = decode(sensor, bytes, piece);
       ASSERT_EQ(decoded.frames.size(), 20U);
@@ -99,7 +112,7 @@ TEST(SensorDecoder, FindsTheUndamagedFramesAgain) {
     for (unsigned n = 0; n < 3000; ++n) {
       const std::vector<double> values = values_of(sensor, n);
       bool whole = true;
-      for (const char c : sent_frame(sensor, values, 0.01 * n))
+      for (const char c : sent(sensor, values, 0.01 * n))
         if (random() % 1000 == 0)
           whole = false;
         else
@@ -109,6 +122,7 @@ TEST(SensorDecoder, FindsTheUndamagedFramesAgain) {
     const Decoded decoded = decode(sensor, bytes, 100);
     std::size_t found = 0;
     for (const auto& frame : decoded.frames) found += undamaged.contains(frame) ? 1 : 0;
+    if (name == "board") EXPECT_TRUE(found == undamaged.size() && found == decoded.frames.size()) << found;
     EXPECT_GE(static_cast<double>(found), 0.99 * static_cast<double>(undamaged.size())) << name;
     EXPECT_LT(undamaged.size(), 2990U) << name;
     EXPECT_GT(decoded.counters.torn, 0U) << name;
@@ -173,7 +187,7 @@ TEST(SensorDecoder, MutatedStreamsGiveFramesOrNone) {
   for (const auto& [name, sensor] : sensors()) {
     for (int run = mutations(400) / 10; run > 0; --run) {
       std::string bytes;
-      for (unsigned n = 0; n < 8; ++n) bytes += sent_frame(sensor, values_of(sensor, n), 0.01 * n);
+      for (unsigned n = 0; n < 8; ++n) bytes += sent(sensor, values_of(sensor, n), 0.01 * n);
       for (unsigned change = 0; change < 1 + random() % 20; ++change) {
         const std::size_t at = random() % bytes.size();
         switch (random() % 4) {
@@ -196,6 +210,98 @@ TEST(SensorDecoder, MutatedStreamsGiveFramesOrNone) {
       for (const auto& frame : decoded.frames) EXPECT_EQ(frame.size(), sensor.values()) << name;
     }
   }
+}
+
+TEST(BoardFrame, LayoutIsThatOfTheBoard) {
+  BoardFrame frame;
+  frame.samples[0] = 0x0ABC;      // patch 0, row 0, column 0: taxel 0
+  frame.samples[5 * 6] = 0x0123;  // column 1, row 2: taxel 6
+  frame.slip = 0x0FED;
+  const auto bytes = frame_bytes(frame);
+  EXPECT_EQ(bytes.size(), 164U);
+  EXPECT_EQ(bytes[0], std::byte{0x24});
+  EXPECT_EQ(bytes[1], std::byte{0x0A});
+  EXPECT_EQ(bytes[2], std::byte{0xBC});
+  EXPECT_EQ(bytes[161], std::byte{0x0F});
+  EXPECT_EQ(bytes[162], std::byte{0xED});
+  EXPECT_EQ(bytes[163], std::byte{0x21});
+  EXPECT_EQ(frame.taxel(6), 0x0123);
+  BoardDecoder decoder;
+  decoder.push(bytes, [](const DecodedFrame& found) { EXPECT_EQ(found.values[6], 0x0123 * (3.3F / 4096)); });
+  EXPECT_EQ(decoder.frame(), frame);
+}
+
+TEST(BoardFrame, EveryHighByteIsChecked) {
+  for (std::size_t at = 1; at <= 161; at += 2) {
+    auto bytes = frame_bytes(random_frame(1));
+    bytes[at] |= std::byte{0x10};
+    BoardDecoder decoder;
+    decoder.push(bytes, [&](const DecodedFrame&) { ADD_FAILURE() << "high byte at " << at; });
+  }
+}
+
+TEST(BoardDecoder, DiscardedBytesAreFramesUpToAFewOfACable) {
+  for (const auto& [bytes, frames] :
+       {std::pair(0U, 0U), {1U, 0U}, {80U, 1U}, {163U, 1U}, {164U, 1U}, {165U, 1U}, {327U, 2U}}) {
+    BoardDecoder decoder;
+    std::vector<std::byte> stream(bytes);
+    const std::vector<std::byte> frame = frame_bytes(random_frame(1));
+    stream.insert(stream.end(), frame.begin(), frame.end());
+    std::vector<std::uint32_t> damaged;
+    decoder.push(stream, [&](const DecodedFrame& found) { damaged.push_back(found.damaged); });
+    EXPECT_EQ(damaged, std::vector{frames}) << bytes;
+  }
+}
+
+TEST(BoardDecoder, FlagsAFlippedHighBitOnceAndAcceptsALastingChange) {
+  BoardDecoder decoder;
+  const auto jump = [&](const BoardFrame& frame) {
+    bool jumps = false;
+    decoder.push(frame_bytes(frame), [&](const DecodedFrame& found) { jumps = found.jump; });
+    return jumps;
+  };
+  BoardFrame frame;
+  frame.samples.fill(3000);
+  EXPECT_FALSE(jump(frame));
+  BoardFrame flipped = frame;
+  flipped.samples[10] ^= 0x400;
+  EXPECT_TRUE(jump(flipped));
+  EXPECT_FALSE(jump(frame));
+  frame.samples[5] = 2000;
+  int flagged = 0;
+  for (int i = 0; i < 10; ++i) flagged += jump(frame) ? 1 : 0;
+  EXPECT_EQ(flagged, 3);
+}
+
+// A thousandth of the bytes is lost, another is put between others.
+TEST(BoardDecoder, AcceptsHardlyAnyWrongFrameUnderMixedFaults) {
+  Dice dice(3, 3);
+  std::vector<std::byte> bytes;
+  std::vector<BoardFrame> sent;
+  std::size_t intact = 0, next = 0, accepted = 0, wrong = 0;
+  for (std::size_t i = 0; i < 20'000; ++i) {
+    sent.push_back(random_frame(i));
+    bool touched = false;
+    for (const std::byte byte : frame_bytes(sent[i])) {
+      const bool lost = dice.hit(1e-3), more = !lost && dice.hit(1e-3);
+      if (!lost) bytes.push_back(byte);
+      if (more) bytes.push_back(static_cast<std::byte>(dice.below(256)));
+      touched = touched || lost || more;
+    }
+    intact += touched ? 0 : 1;
+  }
+  BoardDecoder decoder;
+  decoder.push(bytes, [&](const DecodedFrame&) {
+    const auto from = sent.begin() + static_cast<std::ptrdiff_t>(next);
+    const auto end = sent.begin() + static_cast<std::ptrdiff_t>(std::min(next + 50, sent.size()));
+    const auto at = std::find(from, end, decoder.frame());
+    if (at != end) next = static_cast<std::size_t>(at - sent.begin()) + 1;
+    ++accepted, wrong += at == end ? 1 : 0;
+  });
+  RecordProperty("wrong", static_cast<int>(wrong));
+  EXPECT_LE(static_cast<double>(wrong), 1e-3 * static_cast<double>(accepted));
+  EXPECT_GE(accepted, intact);
+  EXPECT_LT(intact, 18'000U) << "the faults were not injected";
 }
 
 }  // namespace supertac::sensor_decoder_test

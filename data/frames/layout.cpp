@@ -1,10 +1,10 @@
-#include "data/sensors/layout.h"
-
+// How an array's taxels lie, from what they feel: side by side they feel alike.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <set>
 
+#include "data/frames/probe.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 
@@ -20,7 +20,10 @@ using Parts = std::array<double, kParts + 1>;  // the whole, and without each pa
 enum class Rows { in_turn, swapped, even_first };
 
 ArrayLayout layout_of(int rows, int columns, bool serpentine, Rows turn) {
-  ArrayLayout layout{rows, columns, {}};
+  ArrayLayout layout{rows, columns, {}, std::to_string(rows) + " rows of " + std::to_string(columns)};
+  if (turn == Rows::swapped) layout.text += ", swapped in pairs";
+  if (turn == Rows::even_first) layout.text += ", the even ones first";
+  if (serpentine) layout.text += ", every second one sent backwards";
   for (int row = 0; row < rows; ++row) {
     const int half = (rows + 1) / 2;
     const int sent = turn == Rows::swapped      ? std::min(row ^ 1, rows - 1)
@@ -61,9 +64,10 @@ struct Felt {
   explicit Felt(std::span<const std::vector<float>> from) {
     const std::size_t frames = from[0].size(), together = frames / 1000 + 1;
     signals.assign(from.size(), std::vector<double>(frames / together + 1));
-    std::vector<float> frame(from.size());
+    std::vector<float> frame(from.size()), rest;
+    for (std::vector<float> signal : from) rest.push_back(median(signal));
     for (std::size_t i = 0; i < frames; ++i) {
-      for (std::size_t k = 0; k < from.size(); ++k) frame[k] = from[k][i];
+      for (std::size_t k = 0; k < from.size(); ++k) frame[k] = from[k][i] - rest[k];
       const double common = double{median(std::vector(frame))};
       for (std::size_t k = 0; k < from.size(); ++k) signals[k][i / together] += double{frame[k]} - common;
     }
@@ -94,18 +98,6 @@ double lead(const Parts& a, const Parts& b) {
 }
 
 }  // namespace
-
-std::string ArrayLayout::text() const {
-  const auto at = [&](int row) { return order[static_cast<std::size_t>(row * columns)] / columns; };
-  const auto first = [&](int row) { return order[static_cast<std::size_t>(row * columns)] % columns; };
-  std::string text = std::to_string(rows) + " rows of " + std::to_string(columns);
-  if (order.empty()) return text;
-  if (rows > 1 && at(0) == 1) text += ", swapped in pairs";
-  if (rows > 2 && at(0) == 0 && at(2) == 1) text += ", the even ones first";
-  for (int row = 0; row < rows; ++row)
-    if (first(row) > 0) return text + ", every second one sent backwards";
-  return text;
-}
 
 FoundLayout find_layout(std::span<const std::vector<float>> signals) {
   const int taxels = static_cast<int>(signals.size());
@@ -138,11 +130,10 @@ FoundLayout find_layout(std::span<const std::vector<float>> signals) {
             "neighbours do not tell the layout" +
                 (next == nullptr || !(lead(best.score, {}) > 3)
                      ? ""
-                     : ": " + best.layout.text() + ", or " + next->layout.text()) +
+                     : ": " + best.layout.text + ", or " + next->layout.text) +
                 "; press all of the array, here and there, for longer"};
-  std::string says = "taxels side by side feel alike: " + best.layout.text();
-  if (next != nullptr)
-    says += " (" + format(least, 1) + " standard errors before " + next->layout.text() + ")";
+  std::string says = "taxels side by side feel alike: " + best.layout.text;
+  if (next != nullptr) says += " (" + format(least, 1) + " standard errors before " + next->layout.text + ")";
   std::vector<int> plain = best.layout.order;
   std::ranges::sort(plain);
   if (plain == best.layout.order) best.layout.order.clear();

@@ -1,21 +1,35 @@
-#include "data/sensors/layout.h"
+#include "data/frames/probe.h"
 
 #include "io/numbers/random.h"
 #include "tests/support/test.h"
 
 namespace supertac::layout_test {
 
+// Taxels side by side, as places in the frame: the same for what is mirrored or turned.
+std::set<std::pair<int, int>> pairs_of(int rows, int columns, const std::function<int(int, int)>& place) {
+  std::set<std::pair<int, int>> pairs;
+  const auto add = [&](int a, int b) { pairs.emplace(std::min(a, b), std::max(a, b)); };
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < columns; ++c) {
+      if (c + 1 < columns) add(place(r, c), place(r, c + 1));
+      if (r + 1 < rows) add(place(r, c), place(r + 1, c));
+    }
+  return pairs;
+}
+
+enum class Sent { in_turn, serpentine, swapped, mirrored, even_first };
+
 struct Pressing {
   int rows, columns;
   std::uint64_t seed;
-  bool serpentine = false, swapped = false, mirrored = false, even_first = false;
+  Sent form = Sent::in_turn;
   double seconds = 20, reach = 1.1, noise = 0.02;  // reach: of a press, in pitches
 
   int place(int row, int column) const {  // in the frame
-    int sent = swapped ? std::min(row ^ 1, rows - 1) : row;
-    if (even_first) sent = row % 2 == 0 ? row / 2 : (rows + 1) / 2 + row / 2;
-    if (serpentine && sent % 2 == 1) column = columns - 1 - column;
-    return sent * columns + (mirrored ? columns - 1 - column : column);
+    int sent = form == Sent::swapped ? std::min(row ^ 1, rows - 1) : row;
+    if (form == Sent::even_first) sent = row % 2 == 0 ? row / 2 : (rows + 1) / 2 + row / 2;
+    const bool back = form == Sent::mirrored || (form == Sent::serpentine && sent % 2 == 1);
+    return sent * columns + (back ? columns - 1 - column : column);
   }
   // A finger comes down somewhere, moves a little and leaves; one taxel in 20 is dead, and all drift.
   std::vector<std::vector<float>> signals() const {
@@ -40,26 +54,13 @@ struct Pressing {
     }
     return sent;
   }
-  // The pairs side by side, as the frame has them: the same for what is mirrored or turned.
   bool is(const ArrayLayout& layout) const {
     const auto at = [&](int row, int column) {
       const int k = row * layout.columns + column;
       return layout.order.empty() ? k : layout.order[static_cast<std::size_t>(k)];
     };
-    std::vector<std::pair<int, int>> found, right;
-    const auto add = [](auto& pairs, int a, int b) { pairs.emplace_back(std::min(a, b), std::max(a, b)); };
-    for (int r = 0; r < layout.rows; ++r)
-      for (int c = 0; c < layout.columns; ++c) {
-        if (c + 1 < layout.columns) add(found, at(r, c), at(r, c + 1));
-        if (r + 1 < layout.rows) add(found, at(r, c), at(r + 1, c));
-      }
-    for (int r = 0; r < rows; ++r)
-      for (int c = 0; c < columns; ++c) {
-        if (c + 1 < columns) add(right, place(r, c), place(r, c + 1));
-        if (r + 1 < rows) add(right, place(r, c), place(r + 1, c));
-      }
-    std::ranges::sort(found), std::ranges::sort(right);
-    return found == right;
+    return pairs_of(layout.rows, layout.columns, at) ==
+           pairs_of(rows, columns, [this](int row, int column) { return place(row, column); });
   }
 };
 
@@ -69,8 +70,7 @@ TEST(Layout, IsFoundFromWhatNeighboursFeelOrNotTold) {
   for (const auto& [rows, columns] : {std::pair(10, 6), {6, 10}, {16, 16}, {4, 4}, {8, 3}})
     for (const int form : {0, 1, 2, 3, 4})
       for (const double reach : {0.7, 1.1, 1.8}) {
-        const Pressing pressing{rows,      columns,   ++seed, form == 1, form == 2,
-                                form == 3, form == 4, 20,     reach,     0.02};
+        const Pressing pressing{rows, columns, ++seed, static_cast<Sent>(form), 20, reach};
         const FoundLayout found = find_layout(pressing.signals());
         ++all, right += found.layout ? 1 : 0;
         EXPECT_TRUE(!found.layout || pressing.is(*found.layout))
@@ -82,9 +82,9 @@ TEST(Layout, IsFoundFromWhatNeighboursFeelOrNotTold) {
 
 TEST(Layout, OfLittleIsNotTold) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const Pressing rest{6, 10, seed, false, false, false, false, 10, 0.01, 0.02};
+    const Pressing rest{6, 10, seed, Sent::in_turn, 10, 0.01};
     EXPECT_FALSE(find_layout(rest.signals()).layout) << "no press reaches a neighbour";
-    const Pressing one{6, 10, seed, true, false, false, false, 0.7};
+    const Pressing one{6, 10, seed, Sent::serpentine, 0.7};
     const FoundLayout found = find_layout(one.signals());
     EXPECT_TRUE(!found.layout || one.is(*found.layout)) << "after one press: " << found.says;
   }
@@ -92,9 +92,9 @@ TEST(Layout, OfLittleIsNotTold) {
 }
 
 TEST(Layout, SaysHowFramesAreSent) {
-  const FoundLayout found = find_layout(Pressing{4, 7, 5, true}.signals());
+  const FoundLayout found = find_layout(Pressing{4, 7, 5, Sent::serpentine}.signals());
   ASSERT_TRUE(found.layout) << found.says;
-  EXPECT_EQ(found.layout->text(), "4 rows of 7, every second one sent backwards") << found.says;
+  EXPECT_EQ(found.layout->text, "4 rows of 7, every second one sent backwards") << found.says;
   EXPECT_EQ(std::vector(found.layout->order.begin() + 7, found.layout->order.begin() + 14),
             (std::vector{13, 12, 11, 10, 9, 8, 7}));
   EXPECT_NE(found.says.find("whether it is mirrored or turned can never be told so"), std::string::npos);
