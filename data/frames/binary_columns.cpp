@@ -158,10 +158,10 @@ std::uint64_t microseconds(double seconds) {
 }  // namespace
 
 BinaryColumns::BinaryColumns(Bytes bytes, const ByteStretch& stretch, double seconds)
-    : bytes_(bytes), stretch_(stretch), steps_(stretch.rows - 2) {
+    : bytes_(bytes), stretch_(stretch), seconds_(seconds), steps_(stretch.rows - 2) {
   find_constants();
   find_values();
-  find_fields(seconds);
+  find_fields();
 }
 
 void BinaryColumns::find_constants() {
@@ -221,9 +221,7 @@ double BinaryColumns::Values::bits(std::size_t at, std::size_t count) const {
          bits_of_classes(classes, count - 1) + bits_of_share(still, static_cast<double>(count) - still);
 }
 
-void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_endian, double seconds,
-                                bool real) {
-  const std::string type = (real ? "f" : "u") + std::to_string(8 * width);
+void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_endian, bool real) {
   const auto number = [&](std::size_t k) {
     const std::uint64_t bits = load(at(k, column), width, big_endian);
     return real ? microseconds(std::bit_cast<double>(bits)) : bits;
@@ -236,8 +234,10 @@ void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_
     steps.push_back(static_cast<double>((number(k) - number(k - 1)) & mask));
     not_one.add(steps.back() != 1);
   }
+  const std::string type = (real ? "f" : "u") + std::to_string(8 * width);
+  FieldFound found{.field = {FrameField::Is::counter, 0, type}, .width = width, .big_endian = big_endian};
   if (width < 8 && !not_one.too_many()) {
-    FieldFound found{{FrameField::Is::counter, 0, type}, {}, width, 4 + begin + not_one.bits(begin)};
+    found.bits = 4 + begin + not_one.bits(begin);
     fields_[column].push_back(found);
     return;
   }
@@ -259,56 +259,50 @@ void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_
   if (went <= 0 || jumps.too_many()) return;
   const double mean = went / static_cast<double>(steps_), where = begin + std::log2(8.0 * 8),
                pace = std::bit_width(static_cast<std::uint64_t>(usual));
-  FieldFound found{{FrameField::Is::time, 0, ""},
-                   {.type = type},
-                   width,
-                   (width == 4 ? 4 : 8) + where + pace + jumps.bits(where) + bits_of_steps(counts, steps_)};
+  found.bits = (width == 4 ? 4 : 8) + where + pace + jumps.bits(where) + bits_of_steps(counts, steps_);
+  found.time.type = type;
   double best = kNever, second = kNever;
   for (const double unit : {1e-3, 1e-6}) {
-    const double rate = 1 / (mean * unit), ratio = went * unit / std::max(seconds, 1e-9);
+    const double rate = 1 / (mean * unit), ratio = went * unit / std::max(seconds_, 1e-9);
     if (real && unit > 1e-6) continue;
     if (rate < 0.3 || rate > 50'000 || static_cast<double>(number(0)) * unit > 1e10) continue;
     double odds = std::pow(std::log10(rate / 100), 2);  // frames come 10 to 1000 times a second
-    if (seconds >= kAtOnceS) odds = ratio > 0.75 && ratio < 1.25 ? 0 : kNever;
+    if (seconds_ >= kAtOnceS) odds = ratio > 0.75 && ratio < 1.25 ? 0 : kNever;
     if (odds < best)
       second = best, best = odds, found.time.unit_s = unit;
     else
       second = std::min(second, odds);
   }
   if (best == kNever) {  // linear, but in no unit that is known
-    fields_[column].push_back({{FrameField::Is::skip, width, ""}, {}, width, found.bits + 20});
-    return;
+    found.field = {FrameField::Is::skip, width, ""}, found.bits += 20;
+  } else {
+    found.field = {FrameField::Is::time, 0, ""}, found.sure = second - best > 3;
+    // Clocks count from when a sensor was switched on: with each doubling past an hour fewer have run so
+    // long.
+    found.bits +=
+        best + 2 * std::max(0.0, std::log2(static_cast<double>(number(0)) * found.time.unit_s / 3600));
+    if (real) found.time.unit_s = 1;
   }
-  found.sure = second - best > 3;
-  // Clocks count from when a sensor was switched on: with each doubling past an hour fewer have run so long.
-  found.bits +=
-      best + 2 * std::max(0.0, std::log2(static_cast<double>(number(0)) * found.time.unit_s / 3600));
-  if (real) found.time.unit_s = 1;
   fields_[column].push_back(found);
 }
 
-void BinaryColumns::find_fields(double seconds) {
+void BinaryColumns::find_fields() {
   const std::size_t period = stretch_.period;
   fields_.resize(period);
   for (std::size_t c = 0; c < period; ++c) {
     for (const std::size_t width : {1, 2, 4, 8})
       for (const bool big : {false, true}) {
-        if (width == 1 && big) continue;
-        if (width + 4 > period) continue;
-        const std::size_t before = fields_[c].size();
-        add_counter(c, width, big, seconds, false);
-        if (width == 8) add_counter(c, width, big, seconds, true);
-        for (std::size_t k = before; k < fields_[c].size(); ++k) fields_[c][k].big_endian = big;
+        if ((width == 1 && big) || width + 4 > period) continue;
+        add_counter(c, width, big, false);
+        if (width == 8) add_counter(c, width, big, true);
       }
     double same = 0;
     for (std::size_t width = 1; width <= 4 && width < period; ++width) {
-      same += 9 + constant(c + width - 1);
-      if (same < kNever) fields_[c].push_back({{FrameField::Is::skip, width, ""}, {}, width, 20 + same});
-      fields_[c].push_back({{FrameField::Is::skip, width, ""},
-                            {},
-                            width,
-                            20 + 8.0 * static_cast<double>(width * (steps_ + 1)),
-                            false});
+      FieldFound skipped{.field = {FrameField::Is::skip, width, ""}, .width = width};
+      same += 9 + constant(c + width - 1), skipped.bits = 20 + same;
+      if (same < kNever) fields_[c].push_back(skipped);
+      skipped.bits = 20 + 8.0 * static_cast<double>(width * (steps_ + 1)), skipped.sure = false;
+      fields_[c].push_back(skipped);
     }
   }
 }

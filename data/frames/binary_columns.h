@@ -49,7 +49,7 @@ std::vector<double> bits_of_starts(std::span<const Heard> heard, std::size_t fir
 
 /// A field that is no value, as it may stand in a period from some byte on.
 struct FieldFound {
-  FrameField field;
+  FrameField field = {};
   FrameTime time = {};  ///< of a clock
   std::size_t width = 0;
   double bits = 0;
@@ -102,11 +102,12 @@ class BinaryColumns {
   }
   void find_constants();
   void find_values();
-  void find_fields(double seconds);
-  void add_counter(std::size_t column, std::size_t width, bool big_endian, double seconds, bool real);
+  void find_fields();
+  void add_counter(std::size_t column, std::size_t width, bool big_endian, bool real);
 
   Bytes bytes_;
   ByteStretch stretch_;
+  double seconds_;
   std::size_t steps_;  // from row to row
   std::vector<double> constant_;
   std::vector<unsigned char> usual_;

@@ -89,29 +89,26 @@ std::uint32_t checksum_of(const std::string& kind, std::span<const std::byte> by
   return sum & (kind == "sum16" ? 0xFFFF : 0xFF);
 }
 
-BinaryLayout::BinaryLayout(const FrameFormat& format, std::size_t count) {
-  using Is = FrameField::Is;
-  std::vector<FrameField> fields = format.fields;
-  if (fields.empty() && format.time) fields.push_back({.is = Is::time});
-  if (format.fields.empty()) fields.push_back({.is = Is::values, .count = count});
-  std::size_t at = format.header.size();
-  for (const FrameField& field : fields) {
-    if (field.is == Is::values) runs.push_back({at, field.count});
-    if (field.is == Is::time) time_at = at;
-    at += field.is == Is::values ? field.count * bytes_of(format.type)
-          : field.is == Is::skip ? field.count
-                                 : bytes_of(field.is == Is::time ? format.time->type : field.type);
-  }
-  checksum_at = at;
-  size = at + checksum_bytes(format.checksum) + format.trailer.size();
-}
-
 BinaryDecoder::BinaryDecoder(const FrameFormat& format, std::size_t values, bool certain)
     : format_(format),
       value_bytes_(bytes_of(format.type)),
-      layout_(format, values),
       certain_(certain),
-      vague_(format.checksum == "none" && format.trailer.empty()) {}
+      vague_(format.checksum == "none" && format.trailer.empty()) {
+  using Is = FrameField::Is;
+  std::vector<FrameField> fields = format.fields;
+  if (fields.empty() && format.time) fields.push_back({.is = Is::time});
+  if (format.fields.empty()) fields.push_back({.is = Is::values, .count = values});
+  std::size_t at = format.header.size();
+  for (const FrameField& field : fields) {
+    if (field.is == Is::values) runs_.emplace_back(at, field.count);
+    if (field.is == Is::time) time_at_ = at;
+    at += field.is == Is::values ? field.count * value_bytes_
+          : field.is == Is::skip ? field.count
+                                 : bytes_of(field.is == Is::time ? format.time->type : field.type);
+  }
+  checksum_at_ = at;
+  size_ = at + checksum_bytes(format.checksum) + format.trailer.size();
+}
 
 bool BinaryDecoder::has_header(const std::byte* start, std::size_t left) const {
   const std::size_t count = std::min(left, format_.header.size());
@@ -124,10 +121,10 @@ bool BinaryDecoder::is_frame(const std::byte* start) const {
       !std::equal(trailer.begin(), trailer.end(), start + size() - trailer.size()))
     return false;
   if (format_.checksum == "none") return true;
-  const std::size_t from = format_.checksum_from.value_or(format_.header.size()), at = layout_.checksum_at;
-  return bits_at(start + at, checksum_bytes(format_.checksum),
+  const std::size_t from = format_.checksum_from.value_or(format_.header.size());
+  return bits_at(start + checksum_at_, checksum_bytes(format_.checksum),
                  format_.checksum_big_endian.value_or(format_.big_endian)) ==
-         checksum_of(format_.checksum, {start + from, at - from});
+         checksum_of(format_.checksum, {start + from, checksum_at_ - from});
 }
 
 // In the middle of nowhere a header and a trailer may stand a frame apart by chance, and go on doing so while
@@ -218,14 +215,13 @@ void BinaryDecoder::discard(std::size_t count) {
 
 void BinaryDecoder::hand_over(const std::byte* start, const Sink& sink) {
   values_.clear();
-  for (const BinaryLayout::Run& run : layout_.runs)
-    for (std::size_t k = 0; k < run.count; ++k)
+  for (const auto& [at, count] : runs_)
+    for (std::size_t k = 0; k < count; ++k)
       values_.push_back(
-          static_cast<float>(number_at(start + run.at + k * value_bytes_, format_.type, format_.big_endian)));
+          static_cast<float>(number_at(start + at + k * value_bytes_, format_.type, format_.big_endian)));
   DecodedFrame frame{values_, std::nullopt};
   if (format_.time)
-    frame.time_s =
-        number_at(start + layout_.time_at, format_.time->type, format_.big_endian) * format_.time->unit_s;
+    frame.time_s = number_at(start + time_at_, format_.time->type, format_.big_endian) * format_.time->unit_s;
   ++counters_.frames;
   sink(frame);
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/frames/sensor_decoder.h"
@@ -23,16 +24,6 @@ double number_at(const std::byte* bytes, const std::string& type, bool big_endia
 std::uint32_t checksum_of(const std::string& kind, std::span<const std::byte> bytes);
 std::size_t checksum_bytes(const std::string& kind);
 
-/// Where what stands in a frame of this format, in bytes from its first. `count` values, in runs.
-struct BinaryLayout {
-  struct Run {
-    std::size_t at = 0, count = 0;
-  };
-  BinaryLayout(const FrameFormat& format, std::size_t count);
-  std::size_t time_at = 0, checksum_at = 0, size = 0;
-  std::vector<Run> runs;
-};
-
 /// Where one frame ends the next begins. Where that fails it is looked for anew: frames with a checksum or a
 /// trailer are taken as they are; else the place counts whose header returns a frame later the most often, of
 /// up to eight frames. So values that hold the header's bytes cost no frame.
@@ -41,7 +32,7 @@ class BinaryDecoder : public SensorDecoder {
   explicit BinaryDecoder(const Sensor& sensor) : BinaryDecoder(sensor.frame, sensor.values(), false) {}
   void push(std::span<const std::byte> bytes, const Sink& sink) override;
   /// Bytes of a whole frame.
-  std::size_t size() const { return layout_.size; }
+  std::size_t size() const { return size_; }
   /// Bytes kept for the next push().
   std::size_t pending() const { return buffer_.size() - position_; }
 
@@ -65,7 +56,9 @@ class BinaryDecoder : public SensorDecoder {
 
   FrameFormat format_;
   std::size_t value_bytes_;
-  BinaryLayout layout_;
+  // Where what stands, in bytes from a frame's first; values in runs, by their begin.
+  std::size_t time_at_ = 0, checksum_at_ = 0, size_ = 0;
+  std::vector<std::pair<std::size_t, std::size_t>> runs_ = {};
   bool certain_, vague_;  // vague: nothing behind the values tells a whole frame from a torn one
   std::vector<std::byte> buffer_;
   std::size_t position_ = 0;
