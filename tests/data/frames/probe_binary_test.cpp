@@ -30,7 +30,6 @@ struct Dice {
 struct Layout {
   Sensor sensor;
   std::vector<Heard> heard;
-  bool foreign = false;  // its sum is one that no sensor's file can say
   std::string says;
 };
 
@@ -40,69 +39,56 @@ std::string random_bytes(Dice& dice, std::size_t count) {
   return bytes;
 }
 
-/// Fletcher's, or a CRC that begins otherwise than those of a sensor's file.
-std::uint16_t foreign_sum(std::string_view bytes, bool fletcher) {
-  std::uint32_t a = 0, b = 0, crc = 0x1D0F;
-  for (const char c : bytes) {
-    const auto byte = static_cast<unsigned char>(c);
-    a = (a + byte) % 255, b = (b + a) % 255, crc ^= std::uint32_t{byte} << 8;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc << 1 ^ ((crc & 0x8000) != 0 ? 0x1021U : 0U)) & 0xFFFF;
-  }
-  return static_cast<std::uint16_t>(fletcher ? b << 8 | a : crc);
-}
-
-FrameFormat format_of(Dice& dice, std::size_t values, bool& foreign) {
-  using Is = FrameField::Is;
-  FrameFormat f{.kind = FrameKind::binary};
+// The criterion was tuned on seeds 1 to 70 and 1001 to 1067 of each.
+enum class Family { tuned, second, third };
+Layout layout_of(std::uint64_t seed, Family family) {
+  const bool second = family == Family::second, third = family == Family::third;
+  Dice dice(seed, third ? 777 : second ? 77 : 7);
+  Layout layout;
+  Sensor& sensor = layout.sensor;
+  FrameFormat& f = sensor.frame;
+  f = {.kind = FrameKind::binary};
+  const auto shape =
+      third ? dice.of<std::pair<int, int>>({{2, 5}, {4, 7}, {7, 5}, {8, 12}, {11, 13}, {20, 20}, {3, 4}})
+      : second
+          ? dice.of<std::pair<int, int>>({{2, 3}, {5, 5}, {3, 7}, {9, 9}, {6, 10}, {14, 14}, {24, 20}})
+          : dice.of<std::pair<int, int>>(
+                {{2, 2}, {3, 3}, {4, 4}, {2, 6}, {6, 6}, {8, 8}, {10, 10}, {12, 32}, {16, 16}, {16, 32}});
+  sensor.array = {.rows = shape.first, .columns = shape.second};
   f.type = dice.of<std::string>({"u8", "u8", "u16", "u16", "u16", "i16", "f32", "u32", "i32", "i8"});
   f.big_endian = dice.chance(0.5);
-  const std::size_t header = dice.below(5);
+  const std::size_t header = third ? 2 + dice.below(3) : second ? 1 + dice.below(3) : dice.below(5);
   const std::string often[] = {"\xAA", "\xAA\x55", "\xA5\x5A\xA5", "\xFF\xFE\xFD\xFC"};
-  if (header > 0) f.header = dice.chance(0.5) ? often[header - 1] : random_bytes(dice, header);
-  if (header > 0 && dice.chance(0.1))
-    f.header = dice.of<std::string>({"\xEB\x90", "$", "\x5A", "SUP", "TACT", "\x10\x02", "\x02\x25\x2A"});
-  if (f.header.empty() || dice.chance(0.4)) {
+  if (header > 0) f.header = dice.chance(third ? 0.3 : 0.6) ? often[header - 1] : random_bytes(dice, header);
+  if (second && dice.chance(0.3))
+    f.header = dice.of<std::string>({"\xEB\x90", "$", "\x5A", "SUP", "\x10\x02"});
+  const bool checked = f.header.empty() || dice.chance(0.4);
+  if (checked) {
     f.checksum = dice.of<std::string>(
         {"sum8", "xor8", "sum16", "crc8", "crc16-modbus", "crc16-ccitt", "crc16-xmodem", "crc32"});
     if (dice.chance(0.4)) f.checksum_from = 0;
     if (dice.chance(0.3)) f.checksum_big_endian = !f.big_endian;
   }
   if (dice.chance(0.3))
-    f.trailer = dice.of<std::string>(
-        {"\r\n", "\n", "\x0D", "!", "\x03", "\x55\xAA", "END", "\x7E", "\n\n", "\xDD", "*"});
+    f.trailer = third    ? dice.of<std::string>({"\x7E", "\n\n", "\xDD", "*"})
+                : second ? dice.of<std::string>({"\x03", "\x55\xAA", "END"})
+                         : dice.of<std::string>({"\r\n", "\n", "\x0D", "!"});
+  using Is = FrameField::Is;
+  const std::size_t values = sensor.array.signals();
   if (dice.chance(0.3)) {
-    f.time = FrameTime{.type = dice.of<std::string>({"u32", "u32", "u16", "u64", "f64"}),
+    f.time = FrameTime{.type = dice.of<std::string>({"u32", "u32", "u16", "u64"}),
                        .unit_s = dice.of({1e-3, 1e-6})};
     if (f.time->type == "u16") f.time->unit_s = 1e-3;
-    if (f.time->type == "f64") f.time->unit_s = 1;
   }
-  const bool two_bytes = f.type.ends_with("16") || f.type == "f32";  // at least: else a sum looks like values
-  foreign = values <= 36 && two_bytes && f.checksum + f.trailer == "none" && f.header.size() > 1;
-  const bool counted = !foreign && dice.chance(0.3);
-  if (!counted && !foreign) return f;
-  f.fields = {{Is::values, values, ""}};
-  if (f.time) f.fields.insert(f.fields.begin(), {Is::time, 0, ""});
-  if (counted)
-    f.fields.insert(dice.chance(0.7) ? f.fields.begin() : f.fields.end(),
-                    {Is::counter, 0, dice.of<std::string>({"u8", "u16", "u32"})});
-  if (foreign) f.fields.push_back({Is::skip, 2, ""});
-  return f;
-}
-
-Layout layout_of(std::uint64_t seed) {
-  Dice dice(seed, 7);
-  Layout layout;
-  Sensor& sensor = layout.sensor;
-  const auto [rows, columns] =
-      dice.of<std::pair<int, int>>({{2, 2},   {3, 3},   {4, 4}, {2, 6}, {6, 6},  {8, 8},   {10, 10}, {12, 32},
-                                    {16, 16}, {16, 32}, {2, 3}, {5, 5}, {3, 7},  {9, 9},   {6, 10},  {14, 14},
-                                    {24, 20}, {2, 5},   {4, 7}, {7, 5}, {8, 12}, {11, 13}, {20, 20}, {3, 4}});
-  sensor.array = {.rows = rows, .columns = columns};
-  const std::size_t values = sensor.array.signals();
-  const FrameFormat& f = sensor.frame = format_of(dice, values, layout.foreign);
-  sensor.rate_hz = dice.of({12.5, 20.0, 30.0, 50.0, 80.0, 100.0, 200.0, 250.0, 500.0});
-  const bool port = dice.chance(0.5), fletcher = dice.chance(0.5);
-  const double noise = dice.of({0.4, 0.7, 1.0, 2.0, 3.0, 8.0, 20.0, 60.0, 200.0});
+  if (dice.chance(0.3)) {
+    const FrameField counter{Is::counter, 0, dice.of<std::string>({"u8", "u16", "u32"})};
+    f.fields = {{Is::values, values, ""}};
+    if (f.time) f.fields.insert(f.fields.begin(), {Is::time, 0, ""});
+    f.fields.insert(dice.chance(0.7) ? f.fields.begin() : f.fields.end(), counter);
+  }
+  sensor.rate_hz = third ? dice.of({12.5, 30.0, 80.0, 250.0}) : dice.of({20.0, 50.0, 100.0, 200.0, 500.0});
+  const bool port = dice.chance(0.5);
+  const double noise = third ? dice.of({0.7, 2.0, 8.0, 60.0}) : dice.of({0.4, 1.0, 3.0, 20.0, 200.0});
   const double top = f.type.ends_with("8") ? (f.type == "i8" ? 60 : 120)
                      : f.type == "f32"     ? 3
                                            : dice.of({250.0, 1000.0, 4000.0});
@@ -118,8 +104,7 @@ Layout layout_of(std::uint64_t seed) {
              header_in_payload = dice.chance(0.2) && f.type == "u8" && f.header.size() > 1;
   const double seconds = std::clamp(100'000.0 / (static_cast<double>(values) * sensor.rate_hz * 2), 2.0, 5.0);
   const int frames = static_cast<int>(seconds * sensor.rate_hz);
-  const double begin = 5 + 100 * dice.random.uniform(1'000'001) +
-                       (f.time && f.time->type == "f64" && dice.chance(0.5) ? 1.7e9 : 0);
+  const double begin = 5 + 100 * dice.random.uniform(1'000'001);
   std::string bytes;
   if (dice.chance(0.25))
     bytes = "ets Jun  8 2016 00:22:57\r\nrst:0x1 (POWERON_RESET),boot:0x13\r\nSensor ready\r\n";
@@ -144,12 +129,7 @@ Layout layout_of(std::uint64_t seed) {
       for (int i = 0; i < 2; ++i)
         now[static_cast<std::size_t>(i)] = static_cast<unsigned char>(f.header[static_cast<std::size_t>(i)]);
     const double jitter = f.time && f.time->unit_s == 1e-6 ? 2e-5 * dice.normal() : 0;
-    std::string sent = sent_frame(sensor, now, begin + n / sensor.rate_hz + jitter);
-    if (layout.foreign) {
-      sent.resize(sent.size() - 2);
-      append_bytes(sent, foreign_sum(std::string_view(sent).substr(f.header.size()), fletcher), 2,
-                   f.big_endian);
-    }
+    const std::string sent = sent_frame(sensor, now, begin + n / sensor.rate_hz + jitter);
     bytes += sent;
     if (port)
       layout.heard.push_back(
@@ -194,19 +174,85 @@ Outcome outcome_of(Layout& layout) {
 }
 
 TEST(ProbeBinary, DraftsLayoutsRightOrNot) {
-  const auto count = static_cast<std::uint64_t>(mutations(100));
+  const auto count = static_cast<std::uint64_t>(mutations(24));
   const char* first = std::getenv("SUPERTAC_FIRST_SEED");
   const std::uint64_t from = first == nullptr ? 1 : std::strtoull(first, nullptr, 10);
-  int right = 0, known = 0;
-  for (std::uint64_t seed = from; seed < from + count; ++seed) {
-    Layout layout = layout_of(seed);
-    const Outcome outcome = outcome_of(layout);
-    right += outcome == Outcome::right ? 1 : 0, known += layout.foreign ? 0 : 1;
-    EXPECT_NE(outcome, Outcome::wrong) << seed << json_of(layout.sensor).dump() << "\n" << layout.says;
-    EXPECT_TRUE(!layout.foreign || outcome == Outcome::refused) << seed << "\n" << layout.says;
-  }
+  int right = 0;
+  for (const Family family : {Family::tuned, Family::second, Family::third})
+    for (std::uint64_t seed = from; seed < from + count; ++seed) {
+      Layout layout = layout_of(seed, family);
+      const Outcome outcome = outcome_of(layout);
+      right += outcome == Outcome::right ? 1 : 0;
+      EXPECT_NE(outcome, Outcome::wrong) << seed << json_of(layout.sensor).dump() << "\n" << layout.says;
+    }
   RecordProperty("right", right);
-  EXPECT_GE(right, 0.85 * known);
+  EXPECT_GE(right, 0.85 * 3 * static_cast<double>(count));
+}
+
+/// What devices send besides: clocks of real seconds, and sums that no sensor's file can say (Fletcher's, a
+/// CRC that begins otherwise), which are no signals.
+std::uint16_t foreign_sum(std::string_view bytes, bool fletcher) {
+  std::uint32_t a = 0, b = 0, crc = 0x1D0F;
+  for (const char c : bytes) {
+    const auto byte = static_cast<unsigned char>(c);
+    a = (a + byte) % 255, b = (b + a) % 255, crc ^= std::uint32_t{byte} << 8;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc << 1 ^ ((crc & 0x8000) != 0 ? 0x1021U : 0U)) & 0xFFFF;
+  }
+  return static_cast<std::uint16_t>(fletcher ? b << 8 | a : crc);
+}
+
+Layout foreign_layout_of(std::uint64_t seed, bool summed) {
+  Dice dice(seed, 7777);
+  Layout layout;
+  Sensor& sensor = layout.sensor;
+  FrameFormat& f = sensor.frame;
+  sensor.array = {.rows = 4, .columns = dice.of({3, 4, 6, 8})};
+  const std::size_t values = sensor.array.signals();
+  sensor.rate_hz = dice.of({40.0, 100.0});
+  f = {.kind = FrameKind::binary,
+       .header = dice.of<std::string>({"TACT", "\xAA\x55", "\x02\x25\x2A"}),
+       .type = dice.of<std::string>({"u16", "i16", "f32"})};
+  f.big_endian = dice.chance(0.5);
+  if (!summed || dice.chance(0.5))
+    f.time = FrameTime{.type = summed ? "u32" : "f64", .unit_s = summed ? 1e-3 : 1};
+  if (summed) {
+    f.fields = {{FrameField::Is::values, values, ""}, {FrameField::Is::skip, 2, ""}};
+    if (f.time) f.fields.insert(f.fields.begin(), {FrameField::Is::time, 0, ""});
+  }
+  const bool fletcher = dice.chance(0.5), port = dice.chance(0.5);
+  const double scale = f.type == "f32" ? 1e-3 : 1;
+  std::vector<double> rest;
+  for (std::size_t k = 0; k < values; ++k) rest.push_back(300 + 50 * dice.normal());
+  for (int n = 0; n < 200; ++n) {
+    std::vector<double> now;
+    for (std::size_t k = 0; k < values; ++k) {
+      const bool pressed = k / 2 == static_cast<std::size_t>(n) / 25 % (values / 2);
+      const double felt = pressed ? 400 * std::sin(n % 25 / 25.0 * 3.14) : 0;
+      now.push_back(scale * std::round(rest[k] + felt + 2 * dice.normal()));
+    }
+    std::string sent = sent_frame(sensor, now, 1.7e9 * (summed ? 0 : 1) + 20 + n / sensor.rate_hz);
+    if (summed) {
+      const auto sum = foreign_sum(std::string_view(sent).substr(2, sent.size() - 4), fletcher);
+      sent.resize(sent.size() - 2);
+      append_bytes(sent, sum, 2, f.big_endian);
+    }
+    if (port || layout.heard.empty()) layout.heard.push_back({100 + n / sensor.rate_hz, ""});
+    layout.heard.back().bytes += sent;
+  }
+  return layout;
+}
+
+TEST(ProbeBinary, ForeignSumsAreNoSignals) {
+  int right = 0;
+  for (const bool summed : {false, true})
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+      Layout layout = foreign_layout_of(seed, summed);
+      const Outcome outcome = outcome_of(layout);
+      right += outcome == Outcome::right ? 1 : 0;
+      EXPECT_NE(outcome, Outcome::wrong) << seed << json_of(layout.sensor).dump() << "\n" << layout.says;
+      EXPECT_TRUE(!summed || outcome == Outcome::refused);
+    }
+  EXPECT_GE(right, 10);  // of 12 with a clock
 }
 
 std::string framed(const std::string& frame, const std::string& name) {
