@@ -1,9 +1,8 @@
-#include "data/clock/clock_model.h"
-
 #include <algorithm>
 #include <cmath>
 #include <deque>
 
+#include "data/clock/frame_clock.h"
 #include "io/numbers/median.h"
 
 namespace supertac {
@@ -47,9 +46,7 @@ Rate clock_model::slope_of(std::span<const ReadEnd> ends, double period_s, doubl
 
 Lateness clock_model::lateness_of(std::span<const ReadEnd> ends, const Rate& rate, double span_s) {
   const std::size_t count = rate.uncertain < 10 ? ends.size() : 0;  // else levels say nothing
-  const auto level = [&](std::size_t b) {
-    return ends[b].time_s + ends[b].slack_s - rate.period_s * ends[b].last;
-  };
+  const auto level = [&](std::size_t b) { return ends[b].level_s(rate.period_s); };
   // The rate being as unlucky as may be.
   const double unsure_s = std::min(rate.uncertain, 1.0) * rate.period_s;
   const auto falling = [&](std::size_t b) { return level(b) - unsure_s * ends[b].last; };

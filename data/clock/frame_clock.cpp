@@ -43,24 +43,15 @@ double FrameClock::jitter_s() const {
 }
 
 void FrameClock::take(double first, double last, double time_s) {
-  const bool joins = !window_.empty() && (time_s == window_.back().time_s ||
-                                          waited_before(last - window_.back().last,
-                                                        time_s - window_.back().time_s, shortest(rate_)));
-  if (joins)
-    window_.back().last = last, window_.back().time_s = time_s;
-  else
-    window_.push_back({first, last, time_s, window_.empty() ? 0 : time_s - window_.back().time_s});
+  add_read(window_, {.first = first, .last = last, .time_s = time_s}, shortest(rate_));
   const double span = span_s(late_.jitter_s, settings_.stamp_unit_s);
-  while (window_.size() > kReads + 1 && time_s - window_[1].time_s >= span) drop_front();
+  while (window_.size() > kReads + 1 && time_s - window_[1].time_s >= span) {
+    ReadEnd& end = ends_.emplace_back(window_.front());
+    end.first += static_cast<double>(lost_), end.last += static_cast<double>(lost_);
+    window_.pop_front();
+    if (++ended_ % kReads == 0) learn();
+  }
   count_lost();
-}
-
-void FrameClock::drop_front() {
-  const ReadEnd burst = window_.front();
-  window_.pop_front();
-  ends_.push_back(burst);
-  ends_.back().first += static_cast<double>(lost_), ends_.back().last += static_cast<double>(lost_);
-  if (++ended_ % kReads == 0) learn();
 }
 
 // By so many periods the reads behind the envelope's last point are late: as many of them as say so for good,

@@ -51,15 +51,10 @@ class TubeMaker {
   Rate stated() const { return {nominal_s_, tolerance_}; }
   void gather(bool merged) {
     bursts_.clear();
-    for (std::size_t i = 0; i < x_.size(); ++i) {
-      if (std::isnan(y_[i])) continue;
-      const double before = bursts_.empty() ? y_[i] : bursts_.back().time_s;
-      const bool joins =
-          !bursts_.empty() && (y_[i] == before || (merged && waited_before(x_[i] - bursts_.back().last,
-                                                                           y_[i] - before, shortest(rate_))));
-      if (!joins) bursts_.push_back({.first = x_[i], .gap_s = y_[i] - before});
-      bursts_.back().last = x_[i], bursts_.back().time_s = y_[i], bursts_.back().slack_s = slack(i);
-    }
+    for (std::size_t i = 0; i < x_.size(); ++i)
+      if (!std::isnan(y_[i]))
+        add_read(bursts_, {.first = x_[i], .last = x_[i], .time_s = y_[i], .slack_s = slack(i)},
+                 merged ? shortest(rate_) : 0);
   }
 
   void find_rate(double farthest) {
@@ -80,9 +75,6 @@ class TubeMaker {
   }
 
   double slack(std::size_t i) const { return slack_.empty() ? 0 : slack_[i]; }
-  double level(const ReadEnd& burst) const {
-    return burst.time_s + burst.slack_s - rate_.period_s * burst.last;
-  }
 
   // The highest line with this rate under all arrivals that follow, and its steps.
   void find_levels() {
@@ -91,7 +83,7 @@ class TubeMaker {
     const double drift = rate_.uncertain * rate_.period_s;
     const std::size_t count = bursts_.size();
     for (std::size_t b = count; b-- > 0;) {
-      levels_[b] = level(bursts_[b]);
+      levels_[b] = bursts_[b].level_s(rate_.period_s);
       if (b + 1 < count)
         levels_[b] = std::min(levels_[b], levels_[b + 1] + drift * (bursts_[b + 1].last - bursts_[b].last));
     }

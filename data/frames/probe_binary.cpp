@@ -110,14 +110,12 @@ class Search {
     for (std::size_t start = 0; start < period_; ++start) {
       double trailer_bits = 0;
       for (std::size_t trailer = 0; trailer <= kLongestTrailer && trailer + 4 < period_; ++trailer) {
-        if (trailer > 0) {
-          const std::size_t at = start + period_ - trailer;
+        constexpr double kLonger[] = {0, 3, 0, 2, 2};  // than a trailer of a byte less
+        const std::size_t at = start + period_ - trailer;
+        if (trailer > 0)
           trailer_bits += columns_.constant(at) +
                           bits_of_trailer(columns_.usual(at), trailer == 1 ? -1 : columns_.usual(at + 1)) +
-                          (trailer == 1  ? 3
-                           : trailer > 2 ? 2
-                                         : 0);
-        }
+                          kLonger[trailer];
         if (trailer_bits == kNever) break;
         try_headers(start, trailer, trailer_bits);
       }

@@ -147,7 +147,7 @@ SimulatedStream simulated(const StreamTraits& t, std::uint64_t seed) {
 struct Score {
   std::uint64_t dates = 0, outside = 0, falls = 0, missing = 0, resets = 0;
   double worst_s = 0;
-  std::vector<double> widths;  // in periods
+  std::vector<double> widths;
 };
 
 // One offset, the smallest delay, is free: of the whole stream, or of what a device ran through.
@@ -162,15 +162,12 @@ void judge(const SimulatedStream& s, const std::vector<FrameDate>& dates, const 
     // Any offset that suits all of the run, where it is free; else up to the smallest delay.
     for (std::size_t i = begin; i < end; ++i) {
       const double tolerance = 1e-9 + 1e-12 * std::abs(truth[i]);
-      double off = 0;
-      if (free_s >= 0)
-        off = std::max(dates[i].from_s - truth[i] - free_s, truth[i] - dates[i].to_s);
-      else
-        off = low - high;
+      const double off =
+          free_s < 0 ? low - high : std::max(dates[i].from_s - truth[i] - free_s, truth[i] - dates[i].to_s);
       score.outside += off > tolerance + 1e-6 * (free_s < 0 ? s.settings.period_s : 0);
       score.worst_s = std::max(score.worst_s, off);
       ++score.dates;
-      score.widths.push_back(dates[i].doubt_s() * s.traits.rate_hz);
+      score.widths.push_back(dates[i].doubt_s());
       score.falls += i > begin && dates[i].time_s <= dates[i - 1].time_s;
     }
   }
@@ -246,8 +243,8 @@ void study(Score (*score_of)(const SimulatedStream&)) {
                     << " periods), " << score.falls << " fall, " << score.missing << " missing of " << s.lost
                     << " lost";
     dates += score.dates, lost += s.lost, told += score.missing;
-    medians.push_back(quantile(score.widths, 0.5) / s.traits.rate_hz);
-    high.push_back(quantile(score.widths, 0.95) / s.traits.rate_hz);
+    medians.push_back(quantile(score.widths, 0.5));
+    high.push_back(quantile(score.widths, 0.95));
   }
   std::printf(
       "%zu streams, %zu wrong; %zu dates, %zu outside; lost %zu, told %zu, false %zu; of the streams' median "
