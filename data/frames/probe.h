@@ -37,26 +37,6 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
 /// get gain 1. The draft is the sensor with these; empty where nothing was pressed or no frames came.
 ProbeReport find_gain(std::span<const Heard> heard, const Sensor& sensor);
 
-/// Rows and columns of an array whose frames send taxel k as their order[k]-th; empty: as k.
-struct ArrayLayout {
-  int rows = 1, columns = 1;
-  std::vector<int> order = {};
-  std::string text = {};  ///< "6 rows of 10, every second one sent backwards"
-};
-struct FoundLayout {
-  std::optional<ArrayLayout> layout;  ///< empty where it cannot be told
-  std::string says;                   ///< for people, a line
-};
-
-/// How an array's taxels lie, from `signals` [place in the frame][frame], while it was pressed here and
-/// there. A layout's score is the sum, over all pairs of taxels side by side, of the correlation in time of
-/// what they feel: how far each is from its median, less the median of that over the taxels. Layouts are all
-/// ways to cut the places into up to 64 rows of up to 64, each row forwards or every second one backwards,
-/// the rows in turn, swapped in pairs, or the even ones first. The best is taken where it leads every other
-/// by three standard errors of the difference (jackknife over eighths of the time); layouts with the same
-/// pairs, such as mirrored, rotated and transposed ones, are one. Taxels that never change are alike to none.
-FoundLayout find_layout(std::span<const std::vector<float>> signals);
-
 /// Bytes that came within so many seconds came at once, as from a file.
 inline constexpr double kAtOnceS = 0.2;
 

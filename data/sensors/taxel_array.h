@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -67,5 +68,25 @@ struct TaxelArray {
 /// The mean over each taxel's channels, [rows][columns]: a frame as a picture shows it.
 /// Throws std::invalid_argument unless the frame has array.signals() values.
 std::vector<float> mean_of_channels(const TaxelArray& array, std::span<const float> frame);
+
+/// Rows and columns of an array whose frames send taxel k as their order[k]-th; empty: as k.
+struct ArrayLayout {
+  int rows = 1, columns = 1;
+  std::vector<int> order = {};
+  std::string text = {};  ///< "6 rows of 10, every second one sent backwards"
+};
+struct FoundLayout {
+  std::optional<ArrayLayout> layout;  ///< empty where it cannot be told
+  std::string says;                   ///< for people, a line
+};
+
+/// How an array's taxels lie, from `signals` [place in the frame][frame], while it was pressed here and
+/// there. A layout's score is the sum, over all pairs of taxels side by side, of the correlation in time of
+/// what they feel: how far each is from its median, less the median of that over the taxels. Layouts are all
+/// ways to cut the places into up to 64 rows of up to 64, each row forwards or every second one backwards,
+/// the rows in turn, swapped in pairs, or the even ones first. The best is taken where it leads every other
+/// by three standard errors of the difference (jackknife over eighths of the time); layouts with the same
+/// pairs, such as mirrored, rotated and transposed ones, are one. Taxels that never change are alike to none.
+FoundLayout find_layout(std::span<const std::vector<float>> signals);
 
 }  // namespace supertac

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "data/frames/probe.h"
+#include "data/sensors/taxel_array.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 

@@ -1,4 +1,4 @@
-#include "data/frames/probe.h"
+#include "data/sensors/taxel_array.h"
 
 #include "io/numbers/random.h"
 #include "tests/support/test.h"
