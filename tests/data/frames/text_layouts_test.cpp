@@ -356,7 +356,7 @@ TEST(TextLayouts, OnceWrongAreRightOrRefused) {
   expect_right_or_refused(text_layout_of, 1, 0, 4006051);
 }
 // Of the third those with names, channels, commas, numbers of taxels, movies, Fortran's and glued units.
-TEST(TextLayouts, ExportsAndHabitsAreNeverWrong) { expect_right_or_refused(third_layout_of, 96, 0.4); }
+TEST(TextLayouts, ExportsAndHabitsAreNeverWrong) { expect_right_or_refused(third_layout_of, 96, 0.37); }
 TEST(TextLayouts, OfObjectsAndSeveralArraysToo) { expect_right_or_refused(second_layout_of, 40, 0.85); }
 
 }  // namespace supertac::text_layouts_test
