@@ -145,13 +145,7 @@ TEST(MetricsAccumulator, MeasuresPixelsOfAnySize) {
   ScoredPairs of_flat(grid);
   of_flat.add(std::vector<float>(grid.pixels(), 0.5F), truth);
   EXPECT_EQ(of_flat.result().position_error_px, 4);  // half the shorter side
-}
-
-TEST(MetricsAccumulator, FlatOutputHasTheWorstPosition) {
-  ScoredPairs metrics;
-  metrics.add(flat(0), plate("bumps12", 54));
-  EXPECT_EQ(metrics.result().position_error_px, 8);
-  EXPECT_EQ(metrics.result().phase_correlation, 0);
+  EXPECT_EQ(of_flat.result().phase_correlation, 0);
 }
 
 TEST(MetricsAccumulator, KeepsTheFloorOfManyWindowsFromASample) {
@@ -220,34 +214,21 @@ Image with_noise(Image image, double level, std::uint64_t stream) {
   return image;
 }
 
-double mean_peak_of_itself(const char* name, double deviation) {
-  PhaseCorrelator correlator(16, 16);
-  double sum = 0;
-  for (int i = 0; i < 20; ++i) {
-    const auto image = plate(name, 48 + 0.45 * i);
-    const auto n = static_cast<std::uint64_t>(i);
-    sum += correlator(with_noise(image, deviation, 2 * n), with_noise(image, deviation, 2 * n + 1)).peak;
-  }
-  return sum / 20;
-}
-
-// FIELD: .0625 without a window, .937 with it, .31 with noise of .05 in both.
+// FIELD: two identical ridges have .0625 without a Hann window, .937 with it, .31 with noise of .05 in both;
+// images of noise alone have .21.
 TEST(PhaseCorrelation, IdenticalRidgesAgreeBecauseOfTheHannWindow) {
-  EXPECT_NEAR(mean_peak_of_itself("ridges6", 0), 0.937, 0.02);
-  EXPECT_NEAR(mean_peak_of_itself("bumps12", 0), 0.937, 0.02);
-}
-
-TEST(PhaseCorrelation, NoiseCostsMostOfThePeak) {
-  EXPECT_NEAR(mean_peak_of_itself("ridges6", 0.05), 0.31, 0.05);
-}
-
-TEST(PhaseCorrelation, UnrelatedImagesScoreTheFloor) {
   PhaseCorrelator correlator(16, 16);
-  double sum = 0;
-  const Image grey = flat(0.5F);
-  for (std::uint64_t i = 0; i < 50; ++i)
-    sum += correlator(with_noise(grey, 0.2, 2 * i), with_noise(grey, 0.2, 2 * i + 1)).peak;
-  EXPECT_NEAR(sum / 50, 0.21, 0.04);
+  for (const auto& [name, level, expected] : {std::tuple("ridges6", 0.0, 0.937),
+                                              {"bumps12", 0.0, 0.937},
+                                              {"ridges6", 0.05, 0.31},
+                                              {"plain", 0.2, 0.21}}) {
+    double sum = 0;
+    for (std::uint64_t i = 0; i < 50; ++i) {
+      const auto image = plate(name, 48 + 0.18 * static_cast<double>(i));
+      sum += correlator(with_noise(image, level, 2 * i), with_noise(image, level, 2 * i + 1)).peak;
+    }
+    EXPECT_NEAR(sum / 50, expected, level > 0 ? 0.05 : 0.02) << name << " " << level;
+  }
 }
 
 TEST(PhaseCorrelation, IgnoresAmplitudeAndLevel) {
