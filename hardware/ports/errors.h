@@ -17,10 +17,6 @@ struct HardwareError : std::runtime_error {
 
 // A port could not be opened or configured.
 SUPERTAC_ERROR(PortError, HardwareError);
-SUPERTAC_ERROR(PortNotFound, PortError);
-SUPERTAC_ERROR(PortPermission, PortError);
-SUPERTAC_ERROR(PortBusy, PortError);  ///< held by another program, or another part of this one
-SUPERTAC_ERROR(NotASerialPort, PortError);
 SUPERTAC_ERROR(WrongDevice, PortError);    ///< it works, but another device is behind it
 SUPERTAC_ERROR(PortUnplugged, PortError);  ///< end of file (POLLHUP, read 0, EIO, ENXIO); never resumed
 SUPERTAC_ERROR(PortEnded, PortUnplugged);  ///< end of a file or pipe, which may end

@@ -33,16 +33,15 @@ std::string line_of(const fs::path& file) {
   const std::string at = "port " + path + ": ";
   switch (error) {
     case ENOENT:
-      throw PortNotFound(
-          at +
-          "no such port; plug the device in, or run supertac-check machine to see what is there "
-          "and by which path it is found again under another number");
+      throw PortError(at +
+                      "no such port; plug the device in, or run supertac-check machine to see what is there "
+                      "and by which path it is found again under another number");
     case EACCES:
     case EPERM:
-      throw PortPermission(at + "permission denied; run `sudo usermod -aG dialout $USER` and log in again");
+      throw PortError(at + "permission denied; run `sudo usermod -aG dialout $USER` and log in again");
     case EBUSY:
-      throw PortBusy(at + "already open, by another program (see `fuser " + path +
-                     "`) or twice by this one; close it, or name another port");
+      throw PortError(at + "already open, by another program (see `fuser " + path +
+                      "`) or twice by this one; close it, or name another port");
     case ENXIO:
     case ENODEV:
     case EIO:
@@ -88,8 +87,8 @@ SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
   };
   if (isatty(descriptor_) == 0) {
     close(descriptor_);
-    throw NotASerialPort("port " + path +
-                         ": expected a serial port, found another kind of file; run supertac-check machine");
+    throw PortError("port " + path +
+                    ": expected a serial port, found another kind of file; run supertac-check machine");
   }
   if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) give_up(errno == EWOULDBLOCK ? EBUSY : errno);
   if (ioctl(descriptor_, TIOCEXCL) != 0) give_up(errno);
@@ -194,8 +193,8 @@ std::string resolve_board_port(const std::string& path) {
   std::vector<PortInfo> boards = list_ports();
   std::erase_if(boards, [](const PortInfo& port) { return port.usb_id != rig::kBoardUsbId; });
   if (boards.size() == 1) return boards.front().path;
-  throw PortNotFound("port auto: expected one tactile board (USB " + std::string(rig::kBoardUsbId) +
-                     "), found " + std::to_string(boards.size()) + "; plug it in, or name the port");
+  throw PortError("port auto: expected one tactile board (USB " + std::string(rig::kBoardUsbId) +
+                  "), found " + std::to_string(boards.size()) + "; plug it in, or name the port");
 }
 
 std::string lasting_port_name(const std::string& path, const std::string& links) {

@@ -28,8 +28,7 @@ class SerialPort : public Port {
   /// Opens `path` for this process alone: TIOCEXCL, and flock because root passes TIOCEXCL.
   /// DTR and RTS are raised where they exist. What arrived before it was opened is thrown away:
   /// it would be dated as if it came now.
-  /// Throws PortNotFound, PortPermission, PortBusy, NotASerialPort, PortUnplugged; PortError where the system
-  /// makes another baud rate of the one that was asked for.
+  /// Throws PortError, also where the system makes another baud rate of the one that was asked for.
   explicit SerialPort(const std::string& path, const SerialSettings& settings = {});
   ~SerialPort() override;
   SerialPort(const SerialPort&) = delete;
@@ -71,7 +70,7 @@ struct PortInfo {
 /// Ports with a device behind them, by name.
 std::vector<PortInfo> list_ports();
 
-/// `path`, or for "auto" the only port with the board's VID:PID. Throws PortNotFound when there is none or
+/// `path`, or for "auto" the only port with the board's VID:PID. Throws PortError when there is none or
 /// more than one.
 std::string resolve_board_port(const std::string& path);
 

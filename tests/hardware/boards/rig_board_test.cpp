@@ -198,12 +198,4 @@ TEST(RigBoard, AnotherDeviceIsNoBoardAndNoPrinter) {
                "printer's port (supertac-check machine) and that its baud rate is 115200");
 }
 
-TEST(RigBoard, ABoardAtThePrintersPortIsRecognised) {
-  const TemporaryFolder folder;
-  FaultyPtyRig rig(running_rig(), folder / "board", folder / "printer", 5);
-  SerialPort port(folder / "board", {.speedup = 5});
-  MarlinLink link(port);
-  EXPECT_ERROR(link.connect(), WrongDevice, "found no text, as from a tactile board; exchange the two ports");
-}
-
 }  // namespace supertac::rig_board_test

@@ -149,19 +149,6 @@ TEST(CarriedSensor, LostFramesAreCountedAndCostNoPosition) {
   }
 }
 
-TEST(CarriedSensor, AnotherRateThanItsFileSaysCostsNoPosition) {
-  for (const bool stamped : {true, false})
-    for (const double rate_hz : {60.0, 95.0, 300.0}) {
-      Sensor sensor = mat(stamped);
-      sensor.rate_hz = rate_hz;
-      CarriedSensor run(sensor);
-      const CollectedPass pass = run.first_pass();
-      EXPECT_EQ(pass.doubt, "") << rate_hz;
-      EXPECT_EQ(pass.missing + pass.left_out, 0U) << rate_hz;
-      EXPECT_LT(run.worst(pass), stamped ? 0.05 : kTrustedMm) << rate_hz;
-    }
-}
-
 // The computer stands still for up to two seconds: right, left out, or said to be doubtful.
 TEST(CarriedSensor, AHostThatStandsStillMakesNothingWrongInSilence) {
   for (const bool stamped : {true, false}) {
@@ -245,22 +232,6 @@ TEST(CarriedSensor, AHeaderWithoutASensorOrBedIsNamed) {
   EXPECT_ERROR(collect(changed("\"rows\":8", "\"rows\":80")), JournalError, "rows");
   EXPECT_ERROR(collect(changed("\"passes\":1", "\"passes\":0")), JournalError,
                "\"bed\": \"passes\" must be 1 to 1000, found 0");
-}
-
-TEST(CarriedSensor, NothingMovesBeforeItIsHeard) {
-  CarriedSensor run(mat(true));
-  const Sensor wrong = [] {
-    Sensor sensor = mat(true);
-    sensor.array.rows = 4, sensor.order.clear();
-    return sensor;
-  }();
-  Sensor sent = run.settings.sensor;
-  run.settings.sensor = wrong;
-  EXPECT_ERROR(record_palpation(std::make_unique<TextPort>(run.rig.board_port(), run.numbers, sent),
-                                run.rig.printer_port(), run.settings),
-               WrongDevice, "expected frames of 32 values");
-  EXPECT_TRUE(moves_of(run.rig.world().printer()).empty());
-  EXPECT_EQ(run.folder.entries(), 0U) << "a journal of nothing was left behind";
 }
 
 }  // namespace supertac::carried_sensor_test

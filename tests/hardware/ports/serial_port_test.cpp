@@ -42,7 +42,7 @@ TEST_F(SerialPortTest, TakesTheBoardsOddBaudRateAndNoModemLines) {
 TEST_F(SerialPortTest, SecondOpenerIsRefusedEvenAsRoot) {
   {
     const SerialPort first(path_);
-    EXPECT_ERROR(SerialPort second(path_), PortBusy, "already open, by another program (see `fuser ");
+    EXPECT_ERROR(SerialPort second(path_), PortError, "already open, by another program (see `fuser ");
   }
   EXPECT_NO_THROW(SerialPort third(path_));
 }
@@ -62,10 +62,10 @@ TEST(PortList, ALastingNameIsThatOfTheDevice) {
 
 TEST(SerialPort, WhatCannotBeOpenedSaysWhy) {
   const TemporaryFolder folder;
-  EXPECT_ERROR(SerialPort port(folder / "nothing"), PortNotFound,
+  EXPECT_ERROR(SerialPort port(folder / "nothing"), PortError,
                (folder / "nothing") + ": no such port; plug the device in, or run supertac-check machine");
   std::ofstream(folder / "file") << "text";
-  EXPECT_ERROR(SerialPort port(folder / "file"), NotASerialPort,
+  EXPECT_ERROR(SerialPort port(folder / "file"), PortError,
                "expected a serial port, found another kind of file; run supertac-check machine");
 }
 
@@ -79,7 +79,7 @@ TEST_F(SerialPortTest, WithoutPermissionTheGroupIsNamed) {
     if (geteuid() == 0 && setuid(65534) != 0) _exit(2);
     try {
       const SerialPort port(terminal_.path());
-    } catch (const PortPermission& error) {
+    } catch (const PortError& error) {
       code = std::string(error.what()).find("dialout") != std::string::npos ? 0 : 3;
     }
     _exit(code);

@@ -66,7 +66,8 @@ TEST(MarlinLine, RepliesAreClassified) {
   using enum ReplyKind;
   const std::pair<const char*, ReplyKind> lines[] = {
       {"ok", ok},
-      {"ok P15 B3", ok},
+      {"ok N0 P15 B3", ok},
+      {"ok T:25.00 /0.00 B:25.00 /0.00 @:0 B@:0", ok},
       {"okay", other},
       {"start", start},
       {"wait", wait},

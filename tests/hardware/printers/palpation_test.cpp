@@ -128,9 +128,8 @@ TEST(Bed, AMessageNamesTheKey) {
     std::string text = kLeast;
     return bed_of_json(text.insert(1, more + ", "), "b.json");
   };
-  EXPECT_ERROR(
-      bed_of_json("{}", "b.json"), FileError,
-      "b.json: has no \"plate\": expected three numbers of mm within 10000, [x, y, z] of the printer");
+  EXPECT_ERROR(bed_of_json("{}", "b.json"), FileError,
+               "\"plate\" must be three numbers of mm within 10000, [x, y, z] of the printer, found []");
   EXPECT_ERROR(with(R"("low": [0, 0])"), FileError, "\"low\" must be three numbers");
   EXPECT_ERROR(with(R"("low": [])"), FileError, "\"low\" must be three numbers");
   EXPECT_ERROR(with(R"("low": [0, 0, 1e9])"), FileError, "\"low\" must be three numbers");
@@ -138,10 +137,10 @@ TEST(Bed, AMessageNamesTheKey) {
   EXPECT_ERROR(with(R"("speed_mm_s": 51)"), FileError, "\"speed_mm_s\" must be 0.5 to 50, found 51");
   EXPECT_ERROR(with(R"("slide_mm": 109)"), FileError, "\"slide_mm\" must be 1 to 108, found 109");
   EXPECT_ERROR(with(R"("passes": 2.5)"), FileError, "\"passes\" must be a whole number, found 2.5");
-  for (const char* baud : {"9", "1e5", "100000001"})
-    EXPECT_ERROR(with(R"("baud": )" + std::string(baud)), FileError,
-                 "\"baud\" must be a whole number from 50 to 100000000, found ");
-  EXPECT_EQ(with(R"("baud": 2000000)").baud, 2'000'000U);
+  EXPECT_ERROR(with(R"("baud": 9)"), FileError, "\"baud\" must be 50 to 1000000, found 9");
+  for (const char* baud : {"1e5", "1000001"})
+    EXPECT_ERROR(with(R"("baud": )" + std::string(baud)), FileError, "\"baud\" must be a whole number");
+  EXPECT_EQ(with(R"("baud": 1000000)").baud, 1'000'000U);
   EXPECT_ERROR(with(R"("sped": 9)"), FileError, "knows no key 'sped'; it may have plate, origin");
   EXPECT_ERROR(bed_of_json("[", "b.json"), FileError, "b.json");
 }

@@ -192,12 +192,6 @@ TEST(RealMarlin, TheLineBeforeAHaltIsInTheError) {
   EXPECT_ERROR(hot.printer.queue_position(), PrinterHalted, "Heater_ID: E0");
 }
 
-TEST(RealMarlin, AdvancedOkAndTemperatureBehindTheOkAreUnderstood) {
-  ReadyBench bench(running_rig({.advanced_ok = true}));
-  for (const char* code : {"G21", "M105", "M155 S0"}) bench.printer.link().command(code);
-  EXPECT_EQ(bench.printer.link().counters().repeats, 0U);
-}
-
 RigSettings klipper_rig() { return running_rig({.firmware = Firmware::klipper}); }
 
 // It would run it again.

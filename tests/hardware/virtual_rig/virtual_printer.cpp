@@ -298,11 +298,7 @@ void VirtualPrinter::finish_block(double t) {
 void VirtualPrinter::reply_ok() {
   const std::string text = std::exchange(ok_text_, {});
   if (dice_.hit(settings_.faults.lost_ok_rate)) return;
-  output_ += "ok" + text;
-  if (settings_.advanced_ok)
-    output_ +=
-        " N" + std::to_string(lines_.last) + " P15 B" + std::to_string(kCommandBuffer - 1 - queue_.size());
-  output_ += "\n";
+  output_ += "ok" + text + "\n";
 }
 
 }  // namespace supertac

@@ -39,7 +39,6 @@ struct VirtualPrinterSettings {
   Point3 bed = rig::kBed;         ///< soft limits once homed: 0 ... bed
   bool realtime_position = true;  ///< M114 R reports the head, not the end of the queue
   bool emergency_parser = true;
-  bool advanced_ok = false;  ///< `ok N0 P15 B3`
   bool homing_fails = false;
   LeftOver left_over{};
   double acceleration = 500;   ///< of every move (mm/s^2)
