@@ -117,17 +117,9 @@ std::vector<FrameField> fields_of(JsonObject& keys, const Json& json) {
 }
 
 Json json_of(const FrameField& field) {
-  switch (field.is) {
-    case FrameField::Is::counter:
-      return {{"counter", field.type}};
-    case FrameField::Is::skip:
-      return {{"skip", field.count}};
-    case FrameField::Is::values:
-      return {{"values", field.count}};
-    case FrameField::Is::time:
-      break;
-  }
-  return "time";
+  if (field.is == FrameField::Is::time) return "time";
+  if (field.is == FrameField::Is::counter) return {{"counter", field.type}};
+  return {{field.is == FrameField::Is::skip ? "skip" : "values", field.count}};
 }
 
 FrameFormat format_of(const Json& json, const std::string& where) {
@@ -162,9 +154,8 @@ FrameFormat format_of(const Json& json, const std::string& where) {
 }
 
 std::vector<float> floats_of(JsonObject& keys, const char* name) {
-  std::vector<float> list;
-  for (const double number : keys.numbers(name)) list.push_back(static_cast<float>(number));
-  return list;
+  const std::vector<double> list = keys.numbers(name);
+  return {list.begin(), list.end()};
 }
 
 std::vector<int> take_order(JsonObject& keys, const char* key, const TaxelArray& array) {

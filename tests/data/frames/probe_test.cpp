@@ -71,6 +71,7 @@ TEST(Probe, FindsBinaryFormats) {
     EXPECT_EQ(draft.dead, std::vector{5}) << frame;
     EXPECT_NEAR(draft.rate_hz, 100, 1) << frame;
     EXPECT_EQ(draft.port, "here");
+    EXPECT_EQ(draft.body, Body{}) << "what somebody's sensor is built of nobody knows: the rig's is no guess";
   }
 }
 
@@ -236,15 +237,6 @@ TEST(Probe, TellsRestFromPressuresThatLastLonger) {
   }
 }
 
-// What somebody's sensor is built of nobody knows: the rig's dome is no guess. What its file says stays.
-TEST(Probe, GuessesNoBody) {
-  Sensor sensor = sensor_of(R"({"rows":3,"columns":4,"pressed":"higher","range":[100,900],"rate_hz":50,
-    "frame":{"kind":"text"}})");
-  EXPECT_EQ(drafted(sent(sensor, 3)).draft->body, Body{});
-  sensor.body = {.shape = BodyShape::cylinder, .radius_mm = 30, .skin_mm = 3, .knee = 0.7};
-  EXPECT_EQ(drafted(sent(sensor, 3), sensor).draft->body, sensor.body);
-}
-
 // docs/sensors.md: probe again when the rests have drifted.
 TEST(Probe, AtRestKeepsWhatItsFileSaysButTheRests) {
   const Sensor sensor = sensor_of(
@@ -292,11 +284,13 @@ TEST(Probe, KeepsTheOrderOfItsFile) {
     "rate_hz":50,"frame":{"kind":"text"},"order":[6,-1,0,1,2,3,4,5,-1],"dead":[0]})");
   for (int k = 0; k < 9; ++k) sensor.rest.push_back(static_cast<float>(100 + 10 * k));
   sensor.gain.assign(9, 2), sensor.follow_rest_s = 7;
+  sensor.body = {.shape = BodyShape::cylinder, .radius_mm = 30, .skin_mm = 3, .knee = 0.7};
   const ProbeReport report = drafted(sent(sensor, 3), sensor);
   EXPECT_EQ(report.draft->name, "cross");
   EXPECT_EQ(report.draft->order, sensor.order);
   EXPECT_EQ(report.draft->gain, sensor.gain);
   EXPECT_EQ(report.draft->follow_rest_s, 7);
+  EXPECT_EQ(report.draft->body, sensor.body);
   EXPECT_EQ(report.draft->dead, (std::vector{0, 7})) << "the sixth place is the stuck one";
   ASSERT_EQ(report.draft->rest.size(), 9U);
   for (const std::size_t place : {0U, 1U, 4U})
