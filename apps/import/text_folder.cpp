@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "data/plates/plate.h"
-#include "data/registration/pass_features.h"
 #include "data/registration/registration.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/parallel.h"

@@ -1,4 +1,5 @@
-#include "data/registration/pass_features.h"
+// What the signals of a pass show by themselves, without its plate.
+#include "data/registration/registration.h"
 
 #include <algorithm>
 #include <array>

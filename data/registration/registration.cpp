@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "data/registration/pass_features.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/same_bits.h"
 

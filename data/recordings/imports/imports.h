@@ -45,7 +45,7 @@ Table read_table(const std::string& path);
 /// The files have no time stamps. Frame i, counted over *all* lines that are not empty, so that a dropped one
 /// leaves a gap, gets i / rig::kFrameRateHz; metadata "time_base" is "nominal" until a registration replaces
 /// it. What the host lost without leaving a line - 5 to 20 % of the frames - is for restore_clock
-/// (data/registration/pass_features.h). Positions are unknown. plate, trial, pass are left for the caller;
+/// (data/registration/registration.h). Positions are unknown. plate, trial, pass are left for the caller;
 /// source is "imported". Throws FileError as read_table(), for other columns, and where more than a tenth of
 /// the lines are dropped.
 Recording import_text_pass(const std::string& path, std::size_t& dropped);

@@ -1,6 +1,5 @@
 #include "data/registration/registration.h"
 
-#include "data/registration/pass_features.h"
 #include "tests/data/registration/lossy_pass.h"
 #include "tests/support/test.h"
 

@@ -1,4 +1,4 @@
-#include "data/registration/pass_features.h"
+#include "data/registration/registration.h"
 
 #include "tests/data/registration/lossy_pass.h"
 #include "tests/support/test.h"

@@ -1,7 +1,6 @@
 #include "data/registration/registration.h"
 
 #include "data/recordings/imports/imports.h"
-#include "data/registration/pass_features.h"
 #include "tests/data/registration/lossy_pass.h"
 #include "tests/data/test_recordings.h"
 #include "tests/support/test.h"
