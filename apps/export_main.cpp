@@ -3,8 +3,7 @@
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/output_folder.h"
 #include "io/files/file.h"
-#include "models/files/c_code.h"
-#include "models/files/onnx.h"
+#include "models/files/exports.h"
 
 namespace supertac {
 

@@ -13,7 +13,7 @@
 #include "io/files/safetensors.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
-#include "models/files/c_code.h"
+#include "models/files/exports.h"
 
 namespace supertac {
 

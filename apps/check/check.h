@@ -19,7 +19,7 @@ int check_bits(const Arguments& a);
 int check_file(const Arguments& a);
 
 /// `supertac-check chain`: the links from recordings to the picture of a microcontroller
-/// (models/files/c_code.h), each made again and compared with what the exported header states.
+/// (models/files/exports.h), each made again and compared with what the exported header states.
 int check_chain(const Arguments& a);
 
 /// `supertac-check training`: repeats pieces of a training from its kept states and compares every line of

@@ -15,7 +15,7 @@
 #include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
-#include "models/files/c_code.h"
+#include "models/files/exports.h"
 
 namespace supertac {
 namespace {

@@ -1,4 +1,4 @@
-#include "models/files/c_code.h"
+#include "models/files/exports.h"
 
 #include <algorithm>
 #include <bit>

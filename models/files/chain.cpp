@@ -1,4 +1,4 @@
-#include "models/files/c_code.h"
+#include "models/files/exports.h"
 
 #include "io/files/json.h"
 #include "io/files/safetensors.h"

@@ -1,4 +1,4 @@
-#include "models/files/onnx.h"
+#include "models/files/exports.h"
 
 #include <cmath>
 #include <set>

@@ -77,15 +77,12 @@ class Compiler : TraceWalk {
   /// In plan_steps.cpp: what makes the step of each op.
   static const std::map<std::string_view, Make>& makers();
 
-  void add_winograd(struct Winograd step);
   void release_after(std::size_t op);
 
   void conv(const TracedOp& op);
   void winograd(const TracedOp& op);
   void plane_conv(const TracedOp& op);
   void product(const TracedOp& op);
-  void transposed_conv(const TracedOp& op);
-  void transposed_winograd(const TracedOp& op);
 
   std::shared_ptr<Plan> plan_ = std::make_shared<Plan>();
   std::map<Id, FeatureMap> maps_;

@@ -121,8 +121,8 @@ class IntegerCompiler : TraceWalk {
   std::map<Id, Scale> scales_;        // as bytes
   std::set<Id> read_as_bytes_, read_as_numbers_;
   std::map<Id, int> numbers_, bytes_;
-  std::set<int> live_, written_;
-  std::map<int, Id> value_of_;
+  std::map<int, Id> live_;  // maps that are still read, and their values
+  std::set<int> written_;
 };
 
 IntegerCompiler::IntegerCompiler(const SuperTac& network, const ActivationRanges& ranges,
@@ -177,7 +177,8 @@ int IntegerCompiler::new_map(const Variable& y, bool bytes) {
   IntegerMap m{layout_of(y), bytes, bytes ? scales_.at(y.node()) : Scale{plan_->number_step(), 0, 32768}};
   const auto rounded = [](Dim size) { return (size + kLine - 1) / kLine * kLine; };
   std::vector<std::pair<Dim, Dim>> taken;
-  for (const int i : live_) taken.emplace_back(map(i).offset, map(i).offset + rounded(map(i).size()));
+  for (const auto& [i, value] : live_)
+    taken.emplace_back(map(i).offset, map(i).offset + rounded(map(i).size()));
   std::ranges::sort(taken);
   for (const auto& [begin, end] : taken) {
     if (begin >= m.offset + rounded(m.size())) break;
@@ -186,14 +187,13 @@ int IntegerCompiler::new_map(const Variable& y, bool bytes) {
   plan_->work_area = std::max(plan_->work_area, m.offset + rounded(m.size()));
   plan_->maps.push_back(m);
   const int index = static_cast<int>(plan_->maps.size()) - 1;
-  live_.insert(index);
-  value_of_[index] = y.node();
+  live_[index] = y.node();
   (bytes ? bytes_ : numbers_)[y.node()] = index;
   return index;
 }
 
 void IntegerCompiler::release(std::size_t op) {
-  std::erase_if(live_, [&](int i) { return !read_after(value_of_.at(i), op); });
+  std::erase_if(live_, [&](const auto& live) { return !read_after(live.second, op); });
 }
 
 IntegerStep& IntegerCompiler::add(std::string function, std::string name, std::vector<int> maps,

@@ -1,5 +1,5 @@
 // A network in whole numbers (int8), as data: the steps that supertac-export writes as C for microcontrollers
-// (models/files/c_code.h). A PC runs the same C (kernels.c), so that both draw the same bits.
+// (models/files/exports.h). A PC runs the same C (kernels.c), so that both draw the same bits.
 #pragma once
 
 #include <cstdint>

@@ -166,13 +166,14 @@ static void sum_step(Compiler& compiler, const TracedOp& op) {
 }
 
 const std::map<std::string_view, Compiler::Make>& Compiler::makers() {
+  static constexpr Make make_conv = [](Compiler& compiler, const TracedOp& op) { compiler.conv(op); };
   static const std::map<std::string_view, Make> known{
       {"take_runs", input_step},
       {"last_frame", input_step},
-      {"conv1d", [](Compiler& compiler, const TracedOp& op) { compiler.conv(op); }},
-      {"conv2d", [](Compiler& compiler, const TracedOp& op) { compiler.conv(op); }},
-      {"conv_transpose1d", [](Compiler& compiler, const TracedOp& op) { compiler.transposed_conv(op); }},
-      {"conv_transpose2d", [](Compiler& compiler, const TracedOp& op) { compiler.transposed_conv(op); }},
+      {"conv1d", make_conv},
+      {"conv2d", make_conv},
+      {"conv_transpose1d", make_conv},
+      {"conv_transpose2d", make_conv},
       {"linear", [](Compiler& compiler, const TracedOp& op) { compiler.product(op); }},
       {"flatten_channels_first", [](Compiler&, const TracedOp&) {}},  // a linear layer takes the map as it is
       {"unflatten_channels_first", unflatten_step},

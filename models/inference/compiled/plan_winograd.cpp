@@ -132,57 +132,40 @@ std::vector<Dim> quarter_taps(Dim top, Dim left, Dim size) {
 
 void Compiler::conv(const TracedOp& op) {
   const ConvSettings& s = op.settings.conv;
-  const bool same =
-      s ==
-      ConvSettings{
-          .height = s.height, .width = s.width, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1};
-  if (same && op.y.dim(op.y.rank() - 1) == 1) return plane_conv(op);
-  if (same && is_of_tiles(op)) return winograd(op);
-  product(op);
+  const Dim kernel = s.transposed ? 4 : 3, stride = s.transposed ? 2 : 1;
+  const bool keeps_or_doubles = s == ConvSettings{.height = s.height,
+                                                  .width = s.width,
+                                                  .kernel_h = kernel,
+                                                  .kernel_w = kernel,
+                                                  .stride_h = stride,
+                                                  .stride_w = stride,
+                                                  .padding_h = 1,
+                                                  .padding_w = 1,
+                                                  .transposed = s.transposed};
+  if (!keeps_or_doubles) return product(op);
+  if (!s.transposed && op.y.dim(op.y.rank() - 1) == 1) return plane_conv(op);
+  is_of_tiles(op) ? winograd(op) : product(op);
 }
 
-void Compiler::transposed_conv(const TracedOp& op) {
-  const ConvSettings& s = op.settings.conv;
-  const bool doubles = s == ConvSettings{.height = s.height,
-                                         .width = s.width,
-                                         .kernel_h = 4,
-                                         .kernel_w = 4,
-                                         .stride_h = 2,
-                                         .stride_w = 2,
-                                         .padding_h = 1,
-                                         .padding_w = 1,
-                                         .transposed = true};
-  if (doubles && is_of_tiles(op)) return transposed_winograd(op);
-  product(op);
-}
-
-void Compiler::add_winograd(Winograd step) {
-  plan_->scratch_ = std::max(plan_->scratch_, step.scratch());
-  add_step(std::move(step));
-}
-
+// Each quarter of a doubled map is a convolution with two by two of the three by three inputs around. The
+// first point of Winograd's transform, 0, sees the first tap alone and the last, infinity, the last one:
+// where these are 0, so is a row or a column of places.
 void Compiler::winograd(const TracedOp& op) {
   const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
-  Winograd step = winograd_step(op, x, y, y.strides());
-  std::vector<Dim> taps;
-  for (Dim tap = 0; tap < 9; ++tap) taps.push_back(tap * x.channels * y.channels);
-  step.add({}, op.inputs[1].value(), taps);
-  add_winograd(std::move(step));
-}
-
-// Each quarter of the outputs is a convolution with two by two of the three by three inputs around. The first
-// point of Winograd's transform, 0, sees the first tap alone and the last, infinity, the last one: where
-// these are 0, so is a row or a column of places.
-void Compiler::transposed_winograd(const TracedOp& op) {
-  const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
-  Winograd step = winograd_step(op, x, y, {y.image(), 2 * y.line(), 2 * y.channels});
+  const Tensor& w = op.inputs[1].value();
+  const Dim size = x.channels * y.channels;
+  const bool doubles = op.settings.conv.transposed;
+  Winograd step = winograd_step(
+      op, x, y, doubles ? kernels::Strides{y.image(), 2 * y.line(), 2 * y.channels} : y.strides());
+  if (!doubles)
+    step.add({}, w, {0, size, 2 * size, 3 * size, 4 * size, 5 * size, 6 * size, 7 * size, 8 * size});
   constexpr Taps kTaps[] = {Taps::first_two, Taps::last_two};
-  for (Dim top = 0; top < 2; ++top) {
+  for (Dim top = 0; doubles && top < 2; ++top)
     for (Dim left = 0; left < 2; ++left)
-      step.add({kTaps[top], kTaps[left], top * y.line() + left * y.channels}, op.inputs[1].value(),
-               quarter_taps(top, left, x.channels * y.channels));
-  }
-  add_winograd(std::move(step));
+      step.add({kTaps[top], kTaps[left], top * y.line() + left * y.channels}, w,
+               quarter_taps(top, left, size));
+  plan_->scratch_ = std::max(plan_->scratch_, step.scratch());
+  add_step(std::move(step));
 }
 
 }  // namespace supertac

@@ -1,4 +1,4 @@
-#include "models/files/onnx.h"
+#include "models/files/exports.h"
 #include "data/windows/transforms.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/hash.h"

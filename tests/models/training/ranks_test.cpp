@@ -66,28 +66,6 @@ Texts on_ranks(int size, const std::function<void(Ranks&)>& work) {
   return errors;
 }
 
-TEST(Ranks, GatherTextsByRank) {
-  on_ranks(4, [](Ranks& ranks) {
-    const std::string mine(static_cast<std::size_t>(3 * ranks.rank()), static_cast<char>('a' + ranks.rank()));
-    EXPECT_EQ(ranks.gather(mine), (Texts{"", "bbb", "cccccc", "ddddddddd"}));
-  });
-}
-
-// A sum in order would lose the ones: (1e16 + 1) + 1 = 1e16.
-TEST(Ranks, AddUpAsABalancedTree) {
-  on_ranks(4, [](Ranks& ranks) {
-    const double mine[] = {1e16, 0, 1, 1};
-    std::vector<double> value = {mine[ranks.rank()]}, buffer(1);
-    ranks.add_up(value, buffer);
-    EXPECT_EQ(value[0], 1e16 + 2);
-    std::vector<float> many(101), room(many.size());
-    const float part[] = {1e8F, 0, 3, 3};  // a float has steps of 8 there
-    for (std::size_t i = 0; i < many.size(); ++i) many[i] = part[ranks.rank()] * static_cast<float>(i % 2);
-    ranks.add_up(many, room);
-    for (std::size_t i = 0; i < many.size(); ++i) ASSERT_EQ(many[i], i % 2 == 0 ? 0 : 1e8F + 8) << i;
-  });
-}
-
 TEST(Ranks, OnlyNumbersThatShareTheMicroBatchesAreTaken) {
   for (const int ranks : {1, 2, 4, 8}) EXPECT_NO_THROW(check_micro_batches(ranks, 8));
   EXPECT_NO_THROW(check_micro_batches(1, 3));

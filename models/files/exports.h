@@ -1,5 +1,5 @@
-// A model as C99 for microcontrollers, and the chain of SHA-256 hashes that leads from recordings to a
-// picture on one (docs/audit.md).
+// A model for other runtimes: as an ONNX file; as C99 for microcontrollers, with the chain of SHA-256 hashes
+// that leads from recordings to a picture on one (docs/audit.md).
 #pragma once
 
 #include <string>
@@ -8,6 +8,14 @@
 #include "models/files/model_file.h"
 
 namespace supertac {
+
+/// The bytes of an ONNX file. The model takes "volts" [N,T,signals] in the sensor's unit, each sample the
+/// mean of the signals over a period of the model's rate; scaling and normalisation are part of the graph. It
+/// draws "picture" [N,height,width] and, where the network has it, "predicted_error", the same shape, of
+/// which interval.h makes 90 % intervals by `interval_factor` of the metadata. The file's metadata are those
+/// of the model. The ops are those of one traced inference (autograd/trace.h). Throws std::logic_error naming
+/// an op that has no counterpart.
+std::string onnx_of(const ModelFile& model);
 
 /// What something was made of, by its SHA-256.
 struct ChainLink {
