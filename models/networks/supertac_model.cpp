@@ -1,6 +1,7 @@
 #include "models/networks/supertac_model.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <stdexcept>
 
@@ -132,15 +133,15 @@ PerGroup<Variable> SuperTac::split(const Variable& windows) const {
   }
   const Dim row = s.columns * s.in_channels;
   const Dim run = s.grouping == Grouping::horizontal ? row : s.in_channels;
-  PerGroup<Variable> groups(s.groups());
+  PerGroup<Variable> groups(static_cast<std::size_t>(s.groups()));
   for (std::size_t g = 0; g < groups.size(); ++g)
     groups[g] = take_runs(windows, {static_cast<Dim>(g) * run, run, row, s.group_signals()});  // [N,T,group]
   return groups;
 }
 
 SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor> eps) const {
-  const Dim groups = settings_.groups();
-  if (eps.size() != static_cast<std::size_t>(groups)) {
+  const auto groups = static_cast<std::size_t>(settings_.groups());
+  if (eps.size() != groups) {
     refuse("SuperTac", "eps", std::to_string(groups) + " tensors", std::to_string(eps.size()));
   }
   Output out{
@@ -151,7 +152,7 @@ SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor
     z[i] = sample_gaussian(out.latent[i].mean, out.latent[i].log_var, eps[i]);
     out.decoded[i] = decoders_[i].forward(z[i]);  // [N,LD] -> [N,T,group_signals]
   }
-  const Prediction drawn = upsampler_.forward(concat_groups(z.span()), Variable(windows));  // of [N,G LD]
+  const Prediction drawn = upsampler_.forward(concat_groups(z), Variable(windows));  // of [N,G LD]
   out.picture = drawn.picture, out.predicted_error = drawn.predicted_error;  // [N,rows scale,columns scale,1]
   return out;
 }
@@ -170,9 +171,9 @@ NetworkFormat SuperTac::format() const {
 
 Variable SuperTac::means(const Variable& windows) const {
   const PerGroup<Variable> groups = split(windows);
-  PerGroup<Variable> means(settings_.groups());
+  PerGroup<Variable> means(groups.size());
   for (std::size_t i = 0; i < means.size(); ++i) means[i] = encoders_[i].mean(groups[i]);  // [N,LD] each
-  return concat_groups(means.span());                                                      // [N,G LD]
+  return concat_groups(means);                                                             // [N,G LD]
 }
 
 Tensor SuperTac::encode(const Tensor& windows) const {

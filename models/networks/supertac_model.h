@@ -2,12 +2,12 @@
 // latents; of single frames (T = 1) residual upsampling alone.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "autograd/kernels/fast/pool.h"
 #include "autograd/trace.h"
 #include "layers/residual.h"
 #include "models/networks/vae.h"
@@ -79,20 +79,9 @@ struct Prediction {
   Variable picture, predicted_error, latents;
 };
 
-/// One T for each group, stored in place: a warm step must not go to the heap.
+/// One T for each group; a warm step must not go to the heap.
 template <class T>
-class PerGroup {
- public:
-  explicit PerGroup(Dim groups = 0) : size_(static_cast<std::size_t>(groups)) {}
-  std::size_t size() const { return size_; }
-  T& operator[](std::size_t i) { return items_[i]; }
-  const T& operator[](std::size_t i) const { return items_[i]; }
-  std::span<const T> span() const { return std::span(items_).first(size_); }
-
- private:
-  std::array<T, kMostLines> items_;
-  std::size_t size_;
-};
+using PerGroup = std::vector<T, PoolAllocator<T>>;
 
 /// Makes picture and predicted error [N,rows scale,columns scale,1], linear outputs, of the latents of the G
 /// groups [N,G LD] and, where settings.sees_last_frame(), of the windows' last frame. A linear layer makes a

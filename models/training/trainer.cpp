@@ -138,7 +138,7 @@ void Trainer::draw_noise(MicroBatch& micro_batch) const {
 // A group's columns of the noise; zeros without sampling.
 PerGroup<Tensor> Trainer::eps_of(const Batch& batch) const {
   const Dim samples = batch.inputs.dim(0), latent = recipe_.model.latent;
-  PerGroup<Tensor> eps(recipe_.model.groups());
+  PerGroup<Tensor> eps(static_cast<std::size_t>(recipe_.model.groups()));
   for (std::size_t g = 0; g < eps.size(); ++g) {
     eps[g] = Tensor::zeros(Shape{samples, latent});
     for (Dim n = 0; batch.noise.defined() && n < samples; ++n) {
@@ -161,11 +161,11 @@ void Trainer::run(MicroBatch& micro_batch) const {
   Loss loss;
   {  // what the loss does not need is free before the way back
     const SuperTac::Output drawn =
-        micro_batch.network.forward(micro_batch.batch.inputs, eps_of(micro_batch.batch).span());
+        micro_batch.network.forward(micro_batch.batch.inputs, eps_of(micro_batch.batch));
     loss = supertac_loss(drawn, micro_batch.batch.targets, recipe_.loss);
     statistics.pictures().add(drawn.picture.value());
     std::size_t first = 0;
-    for (const LatentDistribution& latent : drawn.latent.span()) {  // [n,LD] of each group
+    for (const LatentDistribution& latent : drawn.latent) {  // [n,LD] of each group
       statistics.means().add(latent.mean.value(), first);
       first += static_cast<std::size_t>(latent.mean.dim(1));
     }

@@ -87,8 +87,7 @@ Ledger Ledger::read(const std::string& path) {
 }
 
 std::optional<LedgerLine> Ledger::at(std::int64_t step) const {
-  const auto found = std::lower_bound(lines.begin(), lines.end(), step,
-                                      [](const Line& line, std::int64_t s) { return line.step < s; });
+  const auto found = std::ranges::lower_bound(lines, step, {}, &Line::step);
   if (found == lines.end() || found->step != step) return std::nullopt;
   return LedgerLine::of(found->text);
 }
