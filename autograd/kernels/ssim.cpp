@@ -1,11 +1,9 @@
 // Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004) and its gradient.
-#include "autograd/kernels/ssim.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "autograd/kernels/fast/each.h"
+#include "autograd/kernels/losses.h"
 
 namespace supertac::kernels {
 namespace {

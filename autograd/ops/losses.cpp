@@ -1,10 +1,8 @@
 #include "autograd/ops/losses.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "autograd/kernels/exp.h"
-#include "autograd/kernels/ssim.h"
+#include "autograd/kernels/losses.h"
 #include "autograd/ops/elementwise.h"
 
 namespace supertac {
@@ -15,16 +13,12 @@ Variable l2_loss(const Variable& x, const Variable& target) {
   check_same_shape("l2_loss", "x", x, "target", target);
   const Dim n = x.size();
   if (n == 0) refuse("l2_loss", "x", "an element or more", x.shape().text());
-  const double total = kernels::sum_of(n, [from = x.value().data(), wanted = target.value().data()](Dim i) {
-    const double d = static_cast<double>(from[i]) - static_cast<double>(wanted[i]);
-    return d * d;
-  });
+  const double total = kernels::squared_error(n, x.value().data(), target.value().data());
   const auto value = static_cast<real>(total / static_cast<double>(n));
   return record("l2_loss", Tensor::full({}, value), {&x, &target}, [n](Backward& g) {
     const real twice_each = 2 * g.gy().item() / static_cast<real>(n);
-    const real *from = g.value(0).data(), *wanted = g.value(1).data();
-    add_to_gradient(g, 0, [=](Dim i) { return twice_each * (from[i] - wanted[i]); });
-    add_to_gradient(g, 1, [=](Dim i) { return twice_each * (wanted[i] - from[i]); });
+    const Slot gx = g.slot_of(0), gtarget = g.slot_of(1);
+    kernels::squared_error_grad(n, twice_each, g.value(0).data(), g.value(1).data(), gx, gtarget);
   });
 }
 
@@ -46,18 +40,6 @@ Variable ssim(const Variable& x, const Tensor& target) {
   return record("ssim", Tensor::full({}, value), {&x}, reverse, &settings);
 }
 
-// -log softmax(logits)[label] of one row of classes; `rest` becomes softmax(logits) - onehot(label), its
-// gradient. The largest logit is taken off first: e^x of large numbers overflows.
-static double cross_entropy(Dim classes, const real* logits, Dim label, real* rest) {
-  const real largest = *std::max_element(logits, logits + classes);
-  double norm = 0;
-  for (Dim k = 0; k < classes; ++k)
-    norm += static_cast<double>(rest[k] = kernels::exp_same_bits(logits[k] - largest));
-  for (Dim k = 0; k < classes; ++k) rest[k] = static_cast<real>(static_cast<double>(rest[k]) / norm);
-  rest[label] -= 1;
-  return std::log(norm) - static_cast<double>(logits[label] - largest);
-}
-
 // logits [N,K];  value = mean over n of -log softmax(logits[n])[label n]
 // glogits[n,k] = gy (softmax(logits[n])[k] - [k = label n]) / N
 Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int32_t> labels) {
@@ -74,8 +56,8 @@ Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int3
     if (label < 0 || label >= classes)
       refuse("softmax_cross_entropy", "labels[" + std::to_string(n) + "]",
              "a class in [0," + std::to_string(classes) + ")", std::to_string(label));
-    total +=
-        cross_entropy(classes, logits.value().data() + n * classes, label, gradient.data() + n * classes);
+    total += kernels::cross_entropy(classes, logits.value().data() + n * classes, label,
+                                    gradient.data() + n * classes);
   }
   const auto value = static_cast<real>(total / static_cast<double>(rows));
   return record("softmax_cross_entropy", Tensor::full({}, value), {&logits}, [gradient, rows](Backward& g) {

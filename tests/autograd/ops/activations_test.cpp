@@ -1,6 +1,5 @@
-// tests/models/networks/ops_parity_test.cpp has the values and gradients of these ops. By their rows in
-// apps/check/gradient_cases.cpp `supertac-check gradients` compares these with differences, and
-// tests/layers/gradient_test.cpp tries the ops empty and with planted errors.
+// Rows of apps/check/gradient_cases.cpp have the gradients of these ops: `supertac-check gradients` compares
+// them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
 #include "autograd/ops/activations.h"
 
 #include "autograd/kernels/exp.h"
@@ -14,6 +13,15 @@ namespace supertac::activations_test {
 
 using namespace test;
 using kernels::exp_same_bits, kernels::sigmoid_same_bits;
+
+TEST(Activations, HandComputed) {
+  const Variable x(Tensor::of({4}, {-2, -0.5, 0, 3}));
+  EXPECT_VALUES(relu(x).value(), {4}, {0, 0, 0, 3});
+  EXPECT_VALUES(leaky_relu(x).value(), {4}, {-0.02, -0.005, 0, 3});
+  EXPECT_VALUES(leaky_relu(x, real(0.5)).value(), {4}, {-1, -0.25, 0, 3});
+  EXPECT_VALUES(sigmoid(x).value(), {4}, {0.11920292202211755, 0.3775406687981454, 0.5, 0.9525741268224334});
+  EXPECT_VALUES(clamp(x, -1, 1).value(), {4}, {-1, -0.5, 0, 1});
+}
 
 TEST(Activations, SigmoidNeverOverflows) {
   const Variable x = parameter(Tensor::of({4}, {-1000, -80, 80, 1000}));

@@ -1,6 +1,5 @@
-// tests/models/networks/ops_parity_test.cpp has the values and gradients of these ops. By their rows in
-// apps/check/gradient_cases.cpp `supertac-check gradients` compares these with differences, and
-// tests/layers/gradient_test.cpp tries the ops empty and with planted errors.
+// Rows of apps/check/gradient_cases.cpp have the gradients of these ops: `supertac-check gradients` compares
+// them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
 #include "autograd/ops/arithmetic.h"
 
 #include "tests/autograd/check.h"
@@ -10,8 +9,19 @@ namespace supertac::arithmetic_test {
 
 using namespace test;
 
+const Tensor kA = Tensor::of({2, 2}, {1, -2, 3, 0}), kB = Tensor::of({2, 2}, {5, 7, -1, 4});
+
+TEST(Arithmetic, HandComputed) {
+  EXPECT_VALUES((Variable(kA) + Variable(kB)).value(), {2, 2}, {6, 5, 2, 4});
+  EXPECT_VALUES((Variable(kA) * Variable(kB)).value(), {2, 2}, {5, -14, -3, 0});
+  EXPECT_VALUES((Variable(kA) - Variable(kB)).value(), {2, 2}, {-4, -9, 4, -4});
+  EXPECT_VALUES((-2 * Variable(kA)).value(), {2, 2}, {-2, 4, -6, 0});
+  EXPECT_VALUES((1 - Variable(kA)).value(), {2, 2}, {0, 3, -2, 1});
+  EXPECT_VALUES(sum(Variable(kA)).value(), {}, {2});
+}
+
 TEST(Arithmetic, OneVariableMayBeBothArguments) {
-  const Variable x = parameter(Tensor::of({2, 2}, {1, -2, 3, 0}));
+  const Variable x = parameter(kA);
   backward(sum(x * x + (x + x)));
   EXPECT_VALUES(x.grad(), {2, 2}, {4, -2, 8, 2});
 }

@@ -1,6 +1,5 @@
-// tests/models/networks/ops_parity_test.cpp has the values and gradients of these ops. By their rows in
-// apps/check/gradient_cases.cpp `supertac-check gradients` compares these with differences, and
-// tests/layers/gradient_test.cpp tries the ops empty and with planted errors.
+// Rows of apps/check/gradient_cases.cpp have the gradients of these ops: `supertac-check gradients` compares
+// them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
 #include "autograd/ops/attention.h"
 
 #include "autograd/ops/arithmetic.h"
@@ -10,6 +9,13 @@
 namespace supertac::attention_test {
 
 using namespace test;
+
+TEST(Attention, HandComputed) {
+  const Variable x(Tensor::of({1, 2, 2, 2}, {1, 10, 2, 20, 3, 30, 6, 0}));
+  EXPECT_VALUES(global_mean(x).value(), {1, 2}, {3, 15});
+  const Variable a(Tensor::of({1, 2, 2, 2}, {100, 0, 0, 0, 0, 0, 0, 5})), s(Tensor::of({1, 2}, {2, -1}));
+  EXPECT_VALUES(gated_sum(a, x, s).value(), {1, 2, 2, 2}, {102, -10, 4, -20, 6, -30, 12, 5});
+}
 
 // No pixels, but gates: their gradients are sums of nothing.
 TEST(Attention, OfNoPixels) {

@@ -1,6 +1,5 @@
-// tests/models/networks/ops_parity_test.cpp has the values and gradients of these ops. By their rows in
-// apps/check/gradient_cases.cpp `supertac-check gradients` compares these with differences, and
-// tests/layers/gradient_test.cpp tries the ops empty and with planted errors.
+// Rows of apps/check/gradient_cases.cpp have the gradients of these ops: `supertac-check gradients` compares
+// them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
 #include "autograd/ops/convolution.h"
 
 #include "autograd/ops/arithmetic.h"

@@ -1,6 +1,5 @@
-// tests/models/networks/ops_parity_test.cpp has the values and gradients of these ops. By their rows in
-// apps/check/gradient_cases.cpp `supertac-check gradients` compares these with differences, and
-// tests/layers/gradient_test.cpp tries the ops empty and with planted errors.
+// Rows of apps/check/gradient_cases.cpp have the gradients of these ops: `supertac-check gradients` compares
+// them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
 #include "autograd/ops/linear.h"
 
 #include "autograd/ops/arithmetic.h"
@@ -10,6 +9,12 @@
 namespace supertac::linear_test {
 
 using namespace test;
+
+TEST(Linear, HandComputed) {
+  const Variable x(Tensor::of({2, 2}, {1, 2, 3, 4})), w(Tensor::of({2, 3}, {1, 0, -1, 2, 1, 0}));
+  const Variable b(Tensor::of({3}, {10, 20, 30}));
+  EXPECT_VALUES(linear(x, w, b).value(), {2, 3}, {15, 22, 29, 21, 24, 27});
+}
 
 TEST(Linear, RefusesOtherShapes) {
   const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));

@@ -1,6 +1,5 @@
-// tests/models/networks/ops_parity_test.cpp has the values and gradients of these ops. By their rows in
-// apps/check/gradient_cases.cpp `supertac-check gradients` compares these with differences, and
-// tests/layers/gradient_test.cpp tries the ops empty and with planted errors.
+// Rows of apps/check/gradient_cases.cpp have the gradients of these ops: `supertac-check gradients` compares
+// them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
 #include "autograd/ops/losses.h"
 
 #include "autograd/ops/arithmetic.h"
@@ -11,6 +10,16 @@ namespace supertac::losses_test {
 
 using namespace test;
 
+TEST(L2Loss, HandComputed) {
+  const Variable x = parameter(Tensor::of({2, 2}, {1, 2, 3, 4})),
+                 t = parameter(Tensor::of({2, 2}, {1, 0, 4, 8}));
+  const Variable loss = l2_loss(x, t);
+  EXPECT_NEAR(static_cast<double>(loss.item()), (0 + 4 + 1 + 16) / 4.0, 10 * kRounding);
+  backward(loss);
+  EXPECT_VALUES(x.grad(), {2, 2}, {0, 1, -0.5, -2});
+  EXPECT_VALUES(t.grad(), {2, 2}, {0, -1, 0.5, 2});
+}
+
 TEST(L2Loss, RefusesOtherShapes) {
   const Variable a(Tensor::zeros({2, 3})), b(Tensor::zeros({3})), none(Tensor::zeros({0}));
   EXPECT_REFUSAL("l2_loss: target expects the shape of x, [2,3], got [3]", l2_loss(a, b));
@@ -19,6 +28,14 @@ TEST(L2Loss, RefusesOtherShapes) {
 
 Variable cross_entropy(const Variable& logits, const std::vector<std::int32_t>& labels) {
   return softmax_cross_entropy(logits, labels);
+}
+
+TEST(CrossEntropy, HandComputed) {
+  const Variable logits = parameter(Tensor::of({2, 2}, {0, 0, real(std::log(3.0)), 0}));
+  const Variable loss = cross_entropy(logits, {1, 0});
+  EXPECT_NEAR(static_cast<double>(loss.item()), (std::log(2.0) + std::log(4.0 / 3)) / 2, kRounding);
+  backward(loss);
+  EXPECT_VALUES(logits.grad(), {2, 2}, {0.25, -0.25, -0.125, 0.125});
 }
 
 TEST(CrossEntropy, LargeLogitsStayFinite) {

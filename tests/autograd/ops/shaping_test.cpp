@@ -1,6 +1,5 @@
-// tests/models/networks/ops_parity_test.cpp has the values and gradients of these ops. By their rows in
-// apps/check/gradient_cases.cpp `supertac-check gradients` compares these with differences, and
-// tests/layers/gradient_test.cpp tries the ops empty and with planted errors.
+// Rows of apps/check/gradient_cases.cpp have the gradients of these ops: `supertac-check gradients` compares
+// them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
 // take_runs() and last_frame() have no gradient.
 #include "autograd/ops/shaping.h"
 
@@ -15,6 +14,20 @@ using namespace test;
 Variable joined(const std::vector<Variable>& xs) { return concat(xs); }
 Variable unflattened(const Variable& x, std::initializer_list<Dim> pixels) {
   return unflatten_channels_first(x, std::span<const Dim>(pixels.begin(), pixels.size()));
+}
+
+TEST(Shaping, HandComputed) {
+  const Variable x(Tensor::of({2, 3}, {1, 2, 3, 4, 5, 6})), y(Tensor::of({2, 1}, {7, 8}));
+  EXPECT_VALUES(joined({x, y}).value(), {2, 4}, {1, 2, 3, 7, 4, 5, 6, 8});
+  const Variable pixels(Tensor::of({1, 2, 3}, {1, 10, 100, 2, 20, 200}));  // [N,L,C]
+  EXPECT_VALUES(flatten_channels_first(pixels).value(), {1, 6}, {1, 2, 10, 20, 100, 200});
+}
+
+TEST(Shaping, UnflattenUndoesFlatten) {
+  const Tensor x = numbers({2, 3, 5, 4});
+  const Variable back = unflattened(flatten_channels_first(Variable(x)), {3, 5});
+  EXPECT_EQ(back.shape().text(), "[2,3,5,4]");
+  EXPECT_TRUE(same_bytes(back.value(), x));
 }
 
 TEST(Shaping, OneAxisIsEnoughToJoin) {

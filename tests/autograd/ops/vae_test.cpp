@@ -1,6 +1,5 @@
-// tests/models/networks/ops_parity_test.cpp has the values and gradients of these ops. By their rows in
-// apps/check/gradient_cases.cpp `supertac-check gradients` compares these with differences, and
-// tests/layers/gradient_test.cpp tries the ops empty and with planted errors.
+// Rows of apps/check/gradient_cases.cpp have the gradients of these ops: `supertac-check gradients` compares
+// them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
 #include "autograd/ops/vae.h"
 
 #include "autograd/ops/activations.h"
@@ -11,6 +10,25 @@
 namespace supertac::vae_test {
 
 using namespace test;
+
+TEST(SampleGaussian, HandComputed) {
+  const Variable mean(Tensor::of({1, 2}, {1, -2})), log_var(Tensor::of({1, 2}, {0, real(std::log(4.0))}));
+  const Variable z = sample_gaussian(mean, log_var, Tensor::of({1, 2}, {3, real(0.5)}));
+  EXPECT_VALUES(z.value(), {1, 2}, {4, -1});
+}
+
+TEST(KlDivergence, HandComputed) {
+  const auto of = [](real mean, real log_var) {
+    return static_cast<double>(
+        kl_divergence(Variable(Tensor::full({1, 1}, mean)), Variable(Tensor::full({1, 1}, log_var))).item());
+  };
+  EXPECT_NEAR(of(0, 0), 0, kRounding);
+  EXPECT_NEAR(of(3, 0), 4.5, 5 * kRounding);
+  EXPECT_NEAR(of(0, 1), 0.5 * (std::exp(1.0) - 2), kRounding);
+  // summed over latents, averaged over the batch
+  const Variable mean(Tensor::full({4, 3}, 2)), log_var(Tensor::zeros({4, 3}));
+  EXPECT_NEAR(static_cast<double>(kl_divergence(mean, log_var).item()), 6, 10 * kRounding);
+}
 
 // A collapsed posterior: the divergence is tiny, and rounding may not make it negative by more than its size.
 TEST(KlDivergence, NearTheStandardNormal) {
