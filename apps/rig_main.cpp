@@ -17,9 +17,9 @@ FingerSignals finger_of(const Arguments& arguments) {
   simulator.with_adc = simulator.with_saturation = false;
   simulator.filter_s = 0;
   simulator.drift_volts_per_s = 0;  // grows with the clock, and a rig may run for days
-  const FingerIdentity identity{.seed = seed, .trial = static_cast<int>(arguments.integer("trial", 1, 1000))};
+  const PassSettings pass{.trial = static_cast<int>(arguments.integer("trial", 1, 1000))};
   const Plate plate = read_option("plate", [&] { return Plate::named(arguments.text("plate")); });
-  const FingerModel finger(plate, simulator, identity);
+  const FingerModel finger(plate, simulator, pass, seed);
   return [finger](double x, double y, double z, double t) {
     const auto volts =
         finger.volts({x - rig::kPlate.x, y - rig::kPlate.y, z - rig::kPlate.z + finger.slide_z_mm()}, t);

@@ -109,26 +109,6 @@ Element measured(const NamedMap& map, std::size_t top, const std::vector<std::si
   return e;
 }
 
-// Elements of one kind, each in its place.
-class Placed : public Surface {
- public:
-  Placed(const std::vector<Element>& found, const Plate& kind) : found_(found), kind_(kind) {
-    extent_.max_height = kind.max_height();
-    extent_.uniform_in_x = kind.uniform_in_x();
-  }
-  double height(double x_mm, double y_mm) const override {
-    double highest = 0;
-    for (const Element& e : found_)
-      highest = std::max(highest, kind_.height(rig::kPlateWidthMm / 2 + x_mm - e.x_mm,
-                                               rig::kPlateLengthMm / 2 + y_mm - e.y_mm));
-    return highest;
-  }
-
- private:
-  std::vector<Element> found_;
-  Plate kind_;
-};
-
 // Of two elements; of lines across the first.
 double distance(const Element& a, const Element& b) {
   const double dx = b.x_mm - a.x_mm, dy = b.y_mm - a.y_mm;
@@ -230,7 +210,14 @@ const Plate& recognise(NamedMap& map, const std::vector<Plate>& kinds) {
 }
 
 Plate plate_of(const std::vector<Element>& found, const Plate& kind) {
-  return {"stated", std::make_shared<const Placed>(found, kind)};
+  const auto highest = [found, kind](double x_mm, double y_mm) {
+    double z = 0;
+    for (const Element& e : found)
+      z = std::max(
+          z, kind.height(rig::kPlateWidthMm / 2 + x_mm - e.x_mm, rig::kPlateLengthMm / 2 + y_mm - e.y_mm));
+    return z;
+  };
+  return {"stated", highest, {.max_height = kind.max_height(), .uniform_in_x = kind.uniform_in_x()}};
 }
 
 void draw_as(NamedMap& map, const std::vector<Plate>& kinds) {

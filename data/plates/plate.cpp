@@ -92,30 +92,21 @@ struct Band {
   }
 };
 
-class Bands : public Surface {
- public:
-  explicit Bands(std::vector<Band> bands) : bands_(std::move(bands)) {
-    auto& [highest, lowest, begin, end, uniform, crests] = extent_;
-    begin = bands_.empty() ? rig::kPlateLengthMm / 2 : bands_.front().begin;
-    end = bands_.empty() ? rig::kPlateLengthMm / 2 : bands_.front().end;
-    for (const Band& band : bands_) {
-      begin = std::min(begin, band.begin), end = std::max(end, band.end);
-      highest = std::max(highest, band.texture.height_mm);
-      lowest = std::min(lowest, band.kind->lowest * band.texture.height_mm);
-      uniform = uniform && band.kind->lines;
-      for (int i = 0; i < band.count_y; ++i) crests.push_back(band.first_y + i * band.texture.pitch_mm);
-    }
-    std::ranges::sort(crests);
+PlateExtent extent_of(const std::vector<Band>& bands) {
+  const double middle = rig::kPlateLengthMm / 2;
+  PlateExtent e{.texture_begin = bands.empty() ? middle : bands.front().begin,
+                .texture_end = bands.empty() ? middle : bands.front().end};
+  for (const Band& band : bands) {
+    e.texture_begin = std::min(e.texture_begin, band.begin),
+    e.texture_end = std::max(e.texture_end, band.end);
+    e.max_height = std::max(e.max_height, band.texture.height_mm);
+    e.min_height = std::min(e.min_height, band.kind->lowest * band.texture.height_mm);
+    e.uniform_in_x = e.uniform_in_x && band.kind->lines;
+    for (int i = 0; i < band.count_y; ++i) e.crests.push_back(band.first_y + i * band.texture.pitch_mm);
   }
-  double height(double x_mm, double y_mm) const override {
-    double z = 0;  // textures do not overlap, so at most one term differs from 0
-    for (const Band& band : bands_) z += band.height(x_mm, y_mm);
-    return z;
-  }
-
- private:
-  std::vector<Band> bands_;
-};
+  std::ranges::sort(e.crests);
+  return e;
+}
 
 [[noreturn]] void refuse(const std::string& name, const std::string& why) {
   throw std::invalid_argument("plate \"" + name + "\": " + why +
@@ -171,9 +162,10 @@ bool Plate::is_file(const std::string& name) {
 }
 
 Plate Plate::named(const std::string& name) {
-  if (is_file(name))
-    return {std::filesystem::path(name).filename().string(),
-            std::make_shared<const HeightMap>(read_stl(name), rig::kPlateWidthMm, rig::kPlateLengthMm, name)};
+  if (is_file(name)) {
+    const HeightMap map(read_stl(name), name);
+    return {std::filesystem::path(name).filename().string(), map, map.extent()};
+  }
   if (name.starts_with(kRandom))
     if (const auto number = parse_uint(name.substr(kRandom.size())); number && *number <= UINT32_MAX)
       return random_plate(static_cast<std::uint32_t>(*number));
@@ -208,11 +200,18 @@ Plate::Plate(std::string name, const std::vector<Texture>& textures) : name_(std
     if (bands.back().count_y < 1) refuse(name_, "no element fits between its ends");
     textures_.push_back(texture);
   }
-  surface_ = std::make_shared<const Bands>(std::move(bands));
+  extent_ = extent_of(bands);
+  surface_ = std::make_shared<const Surface>([bands = std::move(bands)](double x_mm, double y_mm) {
+    double z = 0;  // textures do not overlap, so at most one term differs from 0
+    for (const Band& band : bands) z += band.height(x_mm, y_mm);
+    return z;
+  });
 }
 
-Plate::Plate(std::string name, std::shared_ptr<const Surface> surface)
-    : name_(std::move(name)), surface_(std::move(surface)) {}
+Plate::Plate(std::string name, Surface surface, PlateExtent extent)
+    : name_(std::move(name)),
+      surface_(std::make_shared<const Surface>(std::move(surface))),
+      extent_(std::move(extent)) {}
 
 const std::vector<std::string>& default_plates() {
   static const std::vector<std::string> kNames = {"bumps12",  "bumps6",  "bumps4",

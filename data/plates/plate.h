@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,16 +20,9 @@ struct PlateExtent {
   std::vector<double> crests = {};
 };
 
-/// The shape of a plate: rows of equal elements, the height map of an STL file, or what random_plate() draws.
-class Surface {
- public:
-  virtual ~Surface() = default;
-  virtual double height(double x_mm, double y_mm) const = 0;
-  const PlateExtent& extent() const { return extent_; }
-
- protected:
-  PlateExtent extent_;
-};
+/// The shape of a plate, z (mm) at (x, y): rows of equal elements, the height map of an STL file, or what
+/// random_plate() draws.
+using Surface = std::function<double(double x_mm, double y_mm)>;
 
 /// One texture of a plate: equal elements, pitch_mm apart, 0 between them. Ridges are triangular, 2.5 mm wide
 /// at most; bumps half cylinders, blobs half spheres, twice as wide as high; waves a cosine.
@@ -59,26 +53,26 @@ class Plate {
   /// not positive or do not fit.
   Plate(std::string name, const std::vector<Texture>& textures);
 
-  /// A plate of that size. Copies share the surface.
-  Plate(std::string name, std::shared_ptr<const Surface> surface);
+  /// A plate of any surface with this extent. Copies share the surface.
+  Plate(std::string name, Surface surface, PlateExtent extent);
 
   /// Surface height z (mm) at (x, y); negative in the troughs of waves, 0 outside the texture.
-  double height(double x_mm, double y_mm) const { return surface_->height(x_mm, y_mm); }
+  double height(double x_mm, double y_mm) const { return (*surface_)(x_mm, y_mm); }
 
   /// Highest and lowest z of the plate (mm): 0 and 0 when plain; lowest is -h for waves, else 0.
-  double max_height() const { return surface_->extent().max_height; }
-  double min_height() const { return surface_->extent().min_height; }
+  double max_height() const { return extent_.max_height; }
+  double min_height() const { return extent_.min_height; }
 
   /// Where the texture begins and ends along y (mm); both the middle of the plate when plain.
-  double texture_begin() const { return surface_->extent().texture_begin; }
-  double texture_end() const { return surface_->extent().texture_end; }
+  double texture_begin() const { return extent_.texture_begin; }
+  double texture_end() const { return extent_.texture_end; }
 
   /// Where the elements' highest lines or rows of centres (maps: HeightMap) lie along y (mm),
   /// ascending; empty when plain.
-  const std::vector<double>& crests() const { return surface_->extent().crests; }
+  const std::vector<double>& crests() const { return extent_.crests; }
 
   /// True when the height depends on y only (a map: within 0.05 mm).
-  bool uniform_in_x() const { return surface_->extent().uniform_in_x; }
+  bool uniform_in_x() const { return extent_.uniform_in_x; }
 
   const std::string& name() const { return name_; }
   /// Regular textures, one after the other, plain ones left out; empty for another surface.
@@ -87,6 +81,7 @@ class Plate {
  private:
   std::string name_;
   std::shared_ptr<const Surface> surface_;
+  PlateExtent extent_;
   std::vector<Texture> textures_ = {};
 };
 

@@ -38,12 +38,12 @@ struct Top {
   const Vertex& at(std::size_t row, std::size_t column) const { return points[row * xs.size() + column]; }
 };
 
-// Surfaces that were read count as uniform within more than a solid may be off.
+// Surfaces that were read count as uniform_in_x() within more than a solid may be off.
 bool is_same_along_x(const Plate& plate, const std::vector<double>& xs, const std::vector<double>& ys) {
-  return plate.uniform_in_x() && std::ranges::all_of(ys, [&](double y) {
-           return std::ranges::all_of(
-               xs, [&](double x) { return std::abs(plate.height(x, y) - plate.height(0, y)) <= kSliverMm; });
-         });
+  return std::ranges::all_of(ys, [&](double y) {
+    return std::ranges::all_of(
+        xs, [&](double x) { return std::abs(plate.height(x, y) - plate.height(0, y)) <= kSliverMm; });
+  });
 }
 
 Top top_of(const Plate& plate) {

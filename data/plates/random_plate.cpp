@@ -50,29 +50,24 @@ struct Element {
   }
 };
 
-class Elements : public Surface {
- public:
-  explicit Elements(std::vector<Element> elements) : elements_(std::move(elements)) {
-    auto& [highest, lowest, begin, end, uniform, crests] = extent_;
-    begin = end = elements_.front().y_mm;
-    for (const Element& e : elements_) {
-      begin = std::min(begin, std::max(0.0, e.y_mm - e.reach_mm()));
-      end = std::max(end, std::min(rig::kPlateLengthMm, e.y_mm + e.reach_mm()));
-      highest = std::max(highest, e.height_mm);
-      uniform = uniform && e.line && e.across_x == 0;
-      crests.push_back(e.y_mm);
-    }
-    std::ranges::sort(crests);
+Plate made_of(std::vector<Element> elements, const std::string& name) {
+  const double first_mm = elements.front().y_mm;
+  PlateExtent extent{.texture_begin = first_mm, .texture_end = first_mm};
+  for (const Element& e : elements) {
+    extent.texture_begin = std::min(extent.texture_begin, std::max(0.0, e.y_mm - e.reach_mm()));
+    extent.texture_end = std::max(extent.texture_end, std::min(rig::kPlateLengthMm, e.y_mm + e.reach_mm()));
+    extent.max_height = std::max(extent.max_height, e.height_mm);
+    extent.uniform_in_x = extent.uniform_in_x && e.line && e.across_x == 0;
+    extent.crests.push_back(e.y_mm);
   }
-  double height(double x_mm, double y_mm) const override {
+  std::ranges::sort(extent.crests);
+  const auto highest = [elements = std::move(elements)](double x_mm, double y_mm) {
     double z = 0;
-    for (const Element& e : elements_) z = std::max(z, e.height(x_mm, y_mm));
+    for (const Element& e : elements) z = std::max(z, e.height(x_mm, y_mm));
     return z;
-  }
-
- private:
-  std::vector<Element> elements_;
-};
+  };
+  return {name, highest, extent};
+}
 
 /// A line or a round element: more than half have the rig's size.
 Element draw_element(Draw& draw, bool line) {
@@ -131,22 +126,19 @@ Plate random_plate(std::uint32_t number) {
   Draw draw(number);
   const double from = draw.between(30, 40), to = draw.between(60, 78), layout = draw.between(-1, 16);
   const std::string name = "random" + std::to_string(number);
-  const auto made_of = [&](std::vector<Element> elements) {
-    return Plate(name, std::make_shared<const Elements>(std::move(elements)));
-  };
   if (layout < 1) return {name, std::vector<Texture>{}};
   if (layout < 8) return {name, {draw_texture(draw, from, to)}};
   if (layout < 9.5) {
     const double middle = (from + to) / 2;
     return {name, {draw_texture(draw, from, middle), draw_texture(draw, middle, to)}};
   }
-  if (layout < 13.5) return made_of(draw_lines(draw, from, to));
+  if (layout < 13.5) return made_of(draw_lines(draw, from, to), name);
   if (layout < 14.5) {
     Element e = draw_element(draw, true);
     e.x_mm = rig::kPlateWidthMm / 2, e.y_mm = draw.between(from, to);
-    return made_of({e});
+    return made_of({e}, name);
   }
-  return made_of(draw_scattered(draw, from, to));
+  return made_of(draw_scattered(draw, from, to), name);
 }
 
 }  // namespace supertac

@@ -174,7 +174,8 @@ struct Fit {
   }
 };
 
-Fit fit_to(const std::vector<Triangle>& triangles, double width, double length, const std::string& name) {
+Fit fit_to(const std::vector<Triangle>& triangles, const std::string& name) {
+  const double width = rig::kPlateWidthMm, length = rig::kPlateLengthMm;
   float low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
   for (const Triangle& triangle : triangles)
     for (const auto& corner : triangle)
@@ -217,8 +218,8 @@ Cut cut_at(const Corner (&corners)[3], double row) {
   return cut;
 }
 
-// Raises the nodes of a [rows][columns] grid to the triangle. Returns rows and nodes looked at
-std::size_t raise(const Corner (&corners)[3], std::size_t columns, std::size_t rows, std::vector<float>& z) {
+// Raises the nodes of the grid to the triangle. Returns rows and nodes looked at
+std::size_t raise(const Corner (&corners)[3], std::vector<float>& z) {
   const auto first_node = [](double at) {
     return static_cast<std::ptrdiff_t>(std::max(0.0, std::ceil(at - kEdge)));
   };
@@ -227,19 +228,19 @@ std::size_t raise(const Corner (&corners)[3], std::size_t columns, std::size_t r
   };
   const auto [low, high] = std::minmax({corners[0].v, corners[1].v, corners[2].v});
   std::size_t steps = 1;
-  for (std::ptrdiff_t row = first_node(low); row <= last_node(high, rows); ++row) {
+  for (std::ptrdiff_t row = first_node(low); row <= last_node(high, HeightMap::kRows); ++row) {
     ++steps;
     const Cut cut = cut_at(corners, static_cast<double>(row));
     if (cut.left.u > cut.right.u) continue;
     const double width = cut.right.u - cut.left.u;
     const double top = std::max(cut.left.z, cut.right.z);
-    for (std::ptrdiff_t column = first_node(cut.left.u); column <= last_node(cut.right.u, columns);
-         ++column) {
+    for (std::ptrdiff_t column = first_node(cut.left.u);
+         column <= last_node(cut.right.u, HeightMap::kColumns); ++column) {
       ++steps;
       const double part =
           width > kEdge ? std::clamp((static_cast<double>(column) - cut.left.u) / width, 0.0, 1.0) : 0;
       const double height = width > kEdge ? cut.left.z + part * (cut.right.z - cut.left.z) : top;
-      float& node = z[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)];
+      float& node = z[static_cast<std::size_t>(row) * HeightMap::kColumns + static_cast<std::size_t>(column)];
       node = std::max(node, static_cast<float>(height));
     }
   }
@@ -248,16 +249,13 @@ std::size_t raise(const Corner (&corners)[3], std::size_t columns, std::size_t r
 
 }  // namespace
 
-HeightMap::HeightMap(const std::vector<Triangle>& triangles, double width_mm, double length_mm,
-                     const std::string& name)
-    : columns_(static_cast<std::size_t>(std::lround(width_mm / kCellMm)) + 1),
-      rows_(static_cast<std::size_t>(std::lround(length_mm / kCellMm)) + 1) {
-  const Fit fit = fit_to(triangles, width_mm, length_mm, name);
-  z_.assign(columns_ * rows_, kNothing);
+HeightMap::HeightMap(const std::vector<Triangle>& triangles, const std::string& name)
+    : z_(kColumns * kRows, kNothing) {
+  const Fit fit = fit_to(triangles, name);
   std::size_t steps = 0;
   for (const Triangle& triangle : triangles) {
     const Corner corners[3] = {fit(triangle[0]), fit(triangle[1]), fit(triangle[2])};
-    steps += raise(corners, columns_, rows_, z_);
+    steps += raise(corners, z_);
     if (steps > kMaxSteps) {
       throw FileError(name, "its triangles cover the plate more than " +
                                 std::to_string(kMaxSteps / z_.size()) +
@@ -277,9 +275,9 @@ HeightMap::HeightMap(const std::vector<Triangle>& triangles, double width_mm, do
 // Moves the surface so that its flat part is at 0.
 void HeightMap::level() {
   std::vector<float> outline;
-  for (std::size_t row = 0; row < rows_; ++row) {
-    const bool end = row == 0 || row + 1 == rows_;
-    for (std::size_t column = 0; column < columns_; column += end ? 1 : columns_ - 1)
+  for (std::size_t row = 0; row < kRows; ++row) {
+    const bool end = row == 0 || row + 1 == kRows;
+    for (std::size_t column = 0; column < kColumns; column += end ? 1 : kColumns - 1)
       outline.push_back(at(row, column));
   }
   const float flat = median(outline);
@@ -291,32 +289,32 @@ void HeightMap::level() {
 
 double HeightMap::row_mean(std::size_t row) const {
   double sum = 0;
-  for (std::size_t column = 0; column < columns_; ++column) sum += double{at(row, column)};
-  return sum / static_cast<double>(columns_);
+  for (std::size_t column = 0; column < kColumns; ++column) sum += double{at(row, column)};
+  return sum / static_cast<double>(kColumns);
 }
 
 void HeightMap::measure() {
-  extent_.texture_begin = extent_.texture_end = static_cast<double>(rows_ - 1) * kCellMm / 2;
+  extent_.texture_begin = extent_.texture_end = static_cast<double>(kRows - 1) * kCellMm / 2;
   bool textured = false;
-  for (std::size_t row = 0; row < rows_; ++row) {
+  for (std::size_t row = 0; row < kRows; ++row) {
     const double mean = row_mean(row);
-    const auto [low, high] = std::ranges::minmax(std::span(z_).subspan(row * columns_, columns_));
+    const auto [low, high] = std::ranges::minmax(std::span(z_).subspan(row * kColumns, kColumns));
     extent_.max_height = std::max(extent_.max_height, double{high});
     extent_.min_height = std::min(extent_.min_height, double{low});
     if (double{high} - mean > kUniformMm || mean - double{low} > kUniformMm) extent_.uniform_in_x = false;
     if (low == 0 && high == 0) continue;
     if (!textured) extent_.texture_begin = static_cast<double>(std::max<std::size_t>(row, 1) - 1) * kCellMm;
-    extent_.texture_end = static_cast<double>(std::min(row + 1, rows_ - 1)) * kCellMm;
+    extent_.texture_end = static_cast<double>(std::min(row + 1, kRows - 1)) * kCellMm;
     textured = true;
   }
 }
 
-double HeightMap::height(double x_mm, double y_mm) const {
+double HeightMap::operator()(double x_mm, double y_mm) const {
   const double u = x_mm / kCellMm, v = y_mm / kCellMm;
-  const double last_u = static_cast<double>(columns_ - 1), last_v = static_cast<double>(rows_ - 1);
+  const double last_u = static_cast<double>(kColumns - 1), last_v = static_cast<double>(kRows - 1);
   if (!(u >= 0 && u <= last_u && v >= 0 && v <= last_v)) return 0;
-  const std::size_t column = std::min(static_cast<std::size_t>(u), columns_ - 2);
-  const std::size_t row = std::min(static_cast<std::size_t>(v), rows_ - 2);
+  const std::size_t column = std::min(static_cast<std::size_t>(u), kColumns - 2);
+  const std::size_t row = std::min(static_cast<std::size_t>(v), kRows - 2);
   const double fu = u - static_cast<double>(column), fv = v - static_cast<double>(row);
   const auto along = [&](std::size_t r) {
     return double{at(r, column)} + fu * (double{at(r, column + 1)} - double{at(r, column)});
@@ -325,14 +323,14 @@ double HeightMap::height(double x_mm, double y_mm) const {
 }
 
 void HeightMap::find_crests() {
-  std::vector<double> profile(rows_);
-  for (std::size_t row = 0; row < rows_; ++row) profile[row] = row_mean(row);
+  std::vector<double> profile(kRows);
+  for (std::size_t row = 0; row < kRows; ++row) profile[row] = row_mean(row);
   const double half = *std::max_element(profile.begin(), profile.end()) / 2;
   if (half <= 0) return;
-  for (std::size_t row = 0; row < rows_; ++row) {
+  for (std::size_t row = 0; row < kRows; ++row) {
     if (profile[row] <= half) continue;
     std::size_t end = row;
-    while (end < rows_ && profile[end] > half) ++end;
+    while (end < kRows && profile[end] > half) ++end;
     const double top = *std::max_element(&profile[row], &profile[end - 1] + 1) - kFlatMm;
     std::size_t first = row, last = end - 1;
     while (profile[first] < top) ++first;

@@ -47,26 +47,28 @@ std::vector<std::byte> stl_bytes(const std::vector<Triangle>& triangles, std::st
 ///   crests               where the mean height over x, as a function of y, stays above half its maximum: the
 ///                        middle of each such stretch's highest part. Elements that run into each other above
 ///                        half their height count as one.
-class HeightMap : public Surface {
+class HeightMap {
  public:
   static constexpr double kCellMm = 0.125;  ///< spacing of the grid
+  static constexpr std::size_t kColumns = static_cast<std::size_t>(rig::kPlateWidthMm / kCellMm) + 1,
+                               kRows = static_cast<std::size_t>(rig::kPlateLengthMm / kCellMm) + 1;
 
   /// The highest point of the triangles above every node of the grid, walls and overhangs included. The
-  /// model may lie anywhere; its extent must be width x length, within 0.1 mm.
+  /// model may lie anywhere; its extent must be a plate's, within 0.1 mm.
   /// `name`: of the file, for messages
   /// Throws FileError naming found and expected extent; a hole (nodes below no triangle); or triangles that
   /// lie over each other more often than those of any printed part.
-  HeightMap(const std::vector<Triangle>& triangles, double width_mm, double length_mm,
-            const std::string& name);
+  HeightMap(const std::vector<Triangle>& triangles, const std::string& name);
 
-  /// Bilinear between the nodes; 0 outside.
-  double height(double x_mm, double y_mm) const override;
+  /// Height (mm) at (x, y): bilinear between the nodes; 0 outside.
+  double operator()(double x_mm, double y_mm) const;
+  const PlateExtent& extent() const { return extent_; }
 
  private:
-  std::size_t columns_ = 0, rows_ = 0;
   std::vector<float> z_;  // [rows][columns]
+  PlateExtent extent_;
 
-  float at(std::size_t row, std::size_t column) const { return z_[row * columns_ + column]; }
+  float at(std::size_t row, std::size_t column) const { return z_[row * kColumns + column]; }
   double row_mean(std::size_t row) const;
   void level();
   void measure();

@@ -43,42 +43,39 @@ constexpr int kRows = static_cast<int>((rig::kPlateLengthMm + 2 * kMarginMm) / k
 // As often half as twice.
 double factor(double v) { return v >= 0 ? 1 + v : 1 / (1 - v); }
 
-// Weights of `points` places, `step` apart, for the lines (columns or rows) of taxels, [lines][points]; each
-// line sums to 1. `lean`: each times how many sigmas its place lies from the line, which sums to the lean of
-// a load.
-std::vector<double> taxel_weights(int lines, double pitch, int points, double step, double sigma,
-                                  bool lean = false) {
-  std::vector<double> weights;
+TaxelWeights taxel_weights(int lines, double pitch, int points, double step, double sigma) {
+  TaxelWeights weights;
   for (int line = 0; line < lines; ++line) {
     const auto off = [&](int i) { return step * (i - points / 2) - (line - (lines - 1) / 2.0) * pitch; };
     double sum = 0;
     for (int i = 0; i < points; ++i) sum += same_bits::bell(off(i), sigma);
-    for (int i = 0; i < points; ++i)
-      weights.push_back(same_bits::bell(off(i), sigma) / sum * (lean ? off(i) / sigma : 1));
+    for (int i = 0; i < points; ++i) {
+      weights.load.push_back(same_bits::bell(off(i), sigma) / sum);
+      weights.lean.push_back(weights.load.back() * (off(i) / sigma));
+    }
   }
   return weights;
 }
 
-// Streams: what belongs to the sensor, to a trial of a plate (one mounting), to a pass, and to a sample.
-std::uint64_t mounting_stream(const Plate& plate, int trial) {
-  return stream_of(plate.name() + "/" + std::to_string(trial));
-}
-std::uint64_t pass_stream(const Plate& plate, const FingerIdentity& id) {
-  return stream_of(plate.name() + "/" + std::to_string(id.trial) + "/" + std::to_string(id.pass) + "/" +
-                   std::to_string(static_cast<long long>(id.speed_mm_s * 1000)));
+std::uint64_t pass_stream(const Plate& plate, const PassSettings& pass) {
+  return stream_of(plate.name() + "/" + std::to_string(pass.trial) + "/" + std::to_string(pass.pass) + "/" +
+                   std::to_string(static_cast<long long>(pass.speed_mm_s * 1000)));
 }
 
 }  // namespace
 
-FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& id)
-    : settings_(settings), noise_seed_(id.seed), noise_stream_(pass_stream(plate, id) + 1) {
+FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const PassSettings& of_pass,
+                         std::uint64_t seed)
+    : settings_(settings), noise_seed_(seed), noise_stream_(pass_stream(plate, of_pass) + 1) {
   settings.array.check();
   if (settings.array.channels != 1 && settings.array.channels != 3)
     throw std::invalid_argument("simulator: expected an array of one channel or three axes, got " +
                                 settings.array.text());
   if (settings_.body.skin_mm == 0) settings_.body.skin_mm = Body::of_rig().skin_mm;
-  const RandomStream sensor(id.seed, 0), trial(id.seed, mounting_stream(plate, id.trial));
-  const RandomStream pass(id.seed, pass_stream(plate, id));
+  // Of the sensor, of a trial of a plate (one mounting), and of a pass.
+  const RandomStream sensor(seed, 0),
+      trial(seed, stream_of(plate.name() + "/" + std::to_string(of_pass.trial)));
+  const RandomStream pass(seed, pass_stream(plate, of_pass));
   const double variation = settings.with_variation ? 1 : 0;
   const double spread = variation * settings.gain_spread;
   const double common_gain = factor(spread * pass.normal(1000));
@@ -121,10 +118,8 @@ void FingerModel::shape_pad(double slope_x, double slope_y) {
   // Of a dome no more touches where the array is larger.
   if (settings_.body.shape == BodyShape::flat)
     settings_.mount_stiffness *= points(settings_.array) / points(TaxelArray{});
-  across_weight_ = taxel_weights(columns, pitch.x, across_, kAcrossMm, sigma);
-  along_weight_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma);
-  across_lean_ = taxel_weights(columns, pitch.x, across_, kAcrossMm, sigma, true);
-  along_lean_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma, true);
+  across_weights_ = taxel_weights(columns, pitch.x, across_, kAcrossMm, sigma);
+  along_weights_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma);
   double lowest = 0;
   for (int i = 0; i < across_; ++i)
     for (int j = 0; j < along_; ++j) {
@@ -147,7 +142,7 @@ double FingerModel::surface(double x_mm, double y_mm) const {
 }
 
 std::vector<double> FingerModel::loads(const FingerPose& pose) const {
-  return felt(indented(pose), across_weight_, along_weight_);
+  return felt(indented(pose), across_weights_.load, along_weights_.load);
 }
 
 std::vector<double> FingerModel::indented(const FingerPose& pose) const {
@@ -201,7 +196,8 @@ std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) co
   FingerPose shaken = pose;
   shaken.z_mm +=
       settings_.vibration_mm * same_bits::rough_sine(settings_.vibration_hz * time_s + vibration_phase_);
-  const std::vector<double> depth = indented(shaken), load = felt(depth, across_weight_, along_weight_);
+  const std::vector<double> depth = indented(shaken),
+                            load = felt(depth, across_weights_.load, along_weights_.load);
   const double emi = settings_.emi_volts * same_bits::rough_sine(settings_.emi_hz * time_s + emi_phase_);
   const auto channels = static_cast<std::size_t>(settings_.array.channels);
   std::vector<double> volts(load.size() * channels);
@@ -211,8 +207,8 @@ std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) co
   for (std::size_t k = 0; k < load.size(); ++k)
     volts[k * channels + channels - 1] = disturbed(k, std::max(0.0, load[k] - threshold_[k]));
   if (channels == 3) {
-    const std::vector<double> lean_x = felt(depth, across_lean_, along_weight_),
-                              lean_y = felt(depth, across_weight_, along_lean_);
+    const std::vector<double> lean_x = felt(depth, across_weights_.lean, along_weights_.load),
+                              lean_y = felt(depth, across_weights_.load, along_weights_.lean);
     for (std::size_t k = 0; k < load.size(); ++k) {
       volts[3 * k] = disturbed(k, lean_x[k]) - kMiddleVolts;
       volts[3 * k + 1] = disturbed(k, lean_y[k] - kFriction * load[k]) - kMiddleVolts;
@@ -313,8 +309,7 @@ Recording describe(const Plate& plate, const PassSettings& pass, const Simulator
 Recording simulate_pass(const Plate& plate, const PassSettings& pass, const SimulatorSettings& settings,
                         std::uint64_t seed) {
   check(pass, settings);
-  const FingerModel finger(
-      plate, settings, {.seed = seed, .trial = pass.trial, .pass = pass.pass, .speed_mm_s = pass.speed_mm_s});
+  const FingerModel finger(plate, settings, pass, seed);
   const double duration = 2 * kLiftS + slide_s(pass) + return_s(pass);
   const auto frames = static_cast<std::size_t>(std::floor(duration * settings.rate_hz + 0.5));
   // Timing faults have a stream of their own for each pass, so that a loss in one pass does not move

@@ -47,11 +47,19 @@ struct FingerPose {
   double slope_x = 0, slope_y = 0;  ///< added to the mounting's tilt, in mm per mm: the pad is higher there
 };
 
-/// Which finger, in which pass: the same identity gives the same gains, depth and noise.
-struct FingerIdentity {
-  std::uint64_t seed = 1;
-  int trial = 1, pass = 1;
-  double speed_mm_s = 10;
+/// One pass, as palpation programs move: onset (the finger comes down from rig::kLiftMm), sliding along +y,
+/// release (it lifts), re-position (it moves back and on, in the air, to where the next pass begins).
+struct PassSettings {
+  int trial = 1;
+  int pass = 1;  ///< pass p slides at x = rig::pass_x_mm(p), from one side of the plate to the other
+  double speed_mm_s = rig::kSlideMmS;
+  double from_mm = 0, to_mm = rig::kPlateLengthMm;  ///< the slide, of the finger's centre
+};
+
+/// Weights of the pad's places for the columns or rows of taxels, [lines][places]: a bell, each line of which
+/// sums to 1, and the same times how many sigmas the place lies from the line, which sums to a load's lean.
+struct TaxelWeights {
+  std::vector<double> load, lean;
 };
 
 /// The finger's voltages over a plate, one per taxel: contact of an elastic pad on a yielding mount, then the
@@ -73,8 +81,10 @@ struct FingerIdentity {
 /// Radius, sigma, stiffness, slope and the linear law were fitted to the rig's recordings (docs/import.md).
 class FingerModel {
  public:
-  /// Throws std::invalid_argument for an array out of range or of other than one or three channels.
-  FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& identity);
+  /// The same pass (its trial, number and speed) and seed give the same gains, depth and noise. Throws
+  /// std::invalid_argument for an array out of range or of other than one or three channels.
+  FingerModel(const Plate& plate, const SimulatorSettings& settings, const PassSettings& pass = {},
+              std::uint64_t seed = 1);
 
   /// Voltages [taxels,channels] before ADC, filter and saturation.
   std::vector<double> volts(const FingerPose& pose, double time_s) const;
@@ -100,20 +110,10 @@ class FingerModel {
   std::uint64_t noise_seed_ = 0, noise_stream_ = 0;
   std::vector<double> gain_, threshold_, rest_, drift_;  // per taxel
   double indentation_mm_ = 0, vibration_phase_ = 0, emi_phase_ = 0;
-  std::vector<double> map_;                           // surface on a grid, x fastest
-  std::vector<double> rise_;                          // of the pad's points above its lowest, [across][along]
-  int across_ = 0, along_ = 0;                        // the pad's points across and along the slide
-  std::vector<double> across_weight_, along_weight_;  // bell of each taxel column and row, [lines][points]
-  std::vector<double> across_lean_, along_lean_;      // the same times the place, in sigmas, from the taxel
-};
-
-/// One pass, as palpation programs move: onset (the finger comes down from rig::kLiftMm), sliding along +y,
-/// release (it lifts), re-position (it moves back and on, in the air, to where the next pass begins).
-struct PassSettings {
-  int trial = 1,
-      pass = 1;  ///< pass p slides at x = rig::pass_x_mm(p), from one side of the plate to the other
-  double speed_mm_s = rig::kSlideMmS;
-  double from_mm = 0, to_mm = rig::kPlateLengthMm;  ///< the slide, of the finger's centre
+  std::vector<double> map_;                      // surface on a grid, x fastest
+  std::vector<double> rise_;                     // of the pad's points above its lowest, [across][along]
+  int across_ = 0, along_ = 0;                   // the pad's points across and along the slide
+  TaxelWeights across_weights_, along_weights_;  // of columns and rows
 };
 
 /// A recording of one pass as the rig would make it, with the finger's true position at every time stamp.

@@ -22,9 +22,9 @@ inline void check_stl(std::span<const std::byte> input) {
         for (const float value : corner)
           if (!(std::abs(value) <= kMaxStlCoordinateMm))
             throw std::logic_error("stl: an unusable coordinate was accepted");
-    const HeightMap map(triangles, 36, 108, "fuzz.stl");
+    const HeightMap map(triangles, "fuzz.stl");
     if (!(map.extent().min_height <= map.extent().max_height)) throw std::logic_error("height map: NaN");
-    if (!std::isfinite(map.height(18, 54))) throw std::logic_error("height map: NaN");
+    if (!std::isfinite(map(18, 54))) throw std::logic_error("height map: NaN");
   } catch (const FileError&) {
   }
 }

@@ -147,7 +147,7 @@ std::vector<Triangle> sheet(float z = 0, float x = 0, float y = 0) {
   return triangles;
 }
 
-HeightMap height_map_of(const std::vector<Triangle>& triangles) { return {triangles, 36, 108, "plate.stl"}; }
+HeightMap height_map_of(const std::vector<Triangle>& triangles) { return {triangles, "plate.stl"}; }
 
 void expect_map_refused(const std::vector<Triangle>& triangles, const std::string& expected) {
   EXPECT_ERROR(height_map_of(triangles), FileError, expected);
@@ -159,12 +159,12 @@ TEST(HeightMap, HeightIsThatOfTheHighestTriangleAboveTheOutline) {
   add_quad(triangles, {-10, 340, 4}, {-10, 350, 4}, {-5, 350, 4}, {-5, 340, 4});    // below: hidden
   triangles.push_back({Point{0, 340, 7}, Point{10, 340, 7}, Point{0, 340, 9.5F}});  // a wall
   const HeightMap map = height_map_of(triangles);
-  EXPECT_EQ(map.height(12, 45), 1);
-  EXPECT_EQ(map.height(9.5, 45), 0);
-  EXPECT_EQ(map.height(12, 39.5), 0);
-  EXPECT_NEAR(map.height(20, 40), 2.5, 1e-5);
-  EXPECT_NEAR(map.height(25, 40), 1.25, 1e-5);
-  EXPECT_EQ(map.height(25, 40.5), 0);
+  EXPECT_EQ(map(12, 45), 1);
+  EXPECT_EQ(map(9.5, 45), 0);
+  EXPECT_EQ(map(12, 39.5), 0);
+  EXPECT_NEAR(map(20, 40), 2.5, 1e-5);
+  EXPECT_NEAR(map(25, 40), 1.25, 1e-5);
+  EXPECT_EQ(map(25, 40.5), 0);
   EXPECT_EQ(map.extent().max_height, 2.5);
   EXPECT_EQ(map.extent().min_height, 0);
   EXPECT_EQ(map.extent().texture_begin, 39.875);
@@ -175,7 +175,7 @@ TEST(HeightMap, HeightIsThatOfTheHighestTriangleAboveTheOutline) {
 TEST(HeightMap, ATipThatOnlyTouchesANodeCounts) {
   auto triangles = sheet();
   triangles.push_back({Point{10, 20, 1}, Point{12, 20, 1}, Point{11, 22, 2}});
-  EXPECT_EQ(height_map_of(triangles).height(11, 22), 2);
+  EXPECT_EQ(height_map_of(triangles)(11, 22), 2);
 }
 
 TEST(HeightMap, SlantedFacesAreExactAtNodesAndLinearBetween) {
@@ -185,21 +185,21 @@ TEST(HeightMap, SlantedFacesAreExactAtNodesAndLinearBetween) {
   triangles.push_back({at(0, 0), at(36, 0), at(0, 108)});
   triangles.push_back({at(36, 0), at(36, 108), at(0, 108)});
   const HeightMap map = height_map_of(triangles);
-  const double level = map.height(0, 0);  // of (0, 0) above the outline's median
+  const double level = map(0, 0);  // of (0, 0) above the outline's median
   for (double x = 0; x <= 36; x += 1.7)
     for (double y = 0; y <= 108; y += 3.3)
-      EXPECT_NEAR(map.height(x, y) - level, 0.05 * x - 0.02 * y, 1e-3) << x << " " << y;
+      EXPECT_NEAR(map(x, y) - level, 0.05 * x - 0.02 * y, 1e-3) << x << " " << y;
 }
 
 TEST(HeightMap, OutsideIsFlat) {
   auto triangles = sheet();
   add_quad(triangles, {0, 40, 1}, {36, 40, 1}, {36, 50, 1}, {0, 50, 1});
   const HeightMap map = height_map_of(triangles);
-  EXPECT_EQ(map.height(0, 45), 1);
-  EXPECT_EQ(map.height(36, 45), 1);
-  for (const double x : {-0.01, 36.01, 1e300, std::nan("")}) EXPECT_EQ(map.height(x, 45), 0);
-  EXPECT_EQ(map.height(18, -1), 0);
-  EXPECT_EQ(map.height(18, 109), 0);
+  EXPECT_EQ(map(0, 45), 1);
+  EXPECT_EQ(map(36, 45), 1);
+  for (const double x : {-0.01, 36.01, 1e300, std::nan("")}) EXPECT_EQ(map(x, 45), 0);
+  EXPECT_EQ(map(18, -1), 0);
+  EXPECT_EQ(map(18, 109), 0);
   EXPECT_TRUE(map.extent().uniform_in_x);
   ASSERT_EQ(map.extent().crests.size(), 1u);
   EXPECT_NEAR(map.extent().crests[0], 45, 1e-9);
@@ -238,7 +238,8 @@ const std::vector<std::string>& plates() {
 }
 
 Plate read(const std::vector<Triangle>& solid, const std::string& name) {
-  return {name, std::make_shared<const HeightMap>(solid, rig::kPlateWidthMm, rig::kPlateLengthMm, name)};
+  const HeightMap map(solid, name);
+  return {name, map, map.extent()};
 }
 
 // Every directed edge once, and its opposite once: closed, manifold, facing one way.

@@ -91,7 +91,7 @@ TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
   }
   // A taxel far outside of the rig's pad still has points to feel with.
   settings.array = {.rows = 16, .columns = 16, .pitch_mm = 5};
-  for (const double load : FingerModel(plate, settings, {}).loads({.x_mm = 18, .y_mm = 54, .z_mm = -1}))
+  for (const double load : FingerModel(plate, settings).loads({.x_mm = 18, .y_mm = 54, .z_mm = -1}))
     EXPECT_TRUE(std::isfinite(load));
   settings.array.channels = 2;
   EXPECT_REFUSAL(
@@ -104,9 +104,9 @@ TEST(Simulator, ThreeAxesAreWhereTheLoadLeansAndTheLoad) {
   settings.body.skin_mm = SimulatorSettings().body.skin_mm;
   settings.array = {.rows = 3, .columns = 1, .pitch_mm = 2};
   const Plate plate("one", {{"ridges", 40, 2.5}});
-  const FingerModel one(plate, settings, {});
+  const FingerModel one(plate, settings);
   settings.array.channels = 3;
-  const FingerModel three(plate, settings, {});
+  const FingerModel three(plate, settings);
   const FingerPose pose{
       .x_mm = 18, .y_mm = plate.crests()[0], .z_mm = 2.4};  // the ridge under the middle row
   const std::vector<double> load = one.volts(pose, 0), axes = three.volts(pose, 0);
@@ -124,9 +124,9 @@ TEST(Simulator, ThreeAxesAreWhereTheLoadLeansAndTheLoad) {
 TEST(Simulator, AThresholdTakesNoMoreThanItself) {
   SimulatorSettings settings = clean();
   const Plate plate = Plate::named("plain");
-  const FingerModel every(plate, settings, {});
+  const FingerModel every(plate, settings);
   settings.threshold_mm = 0.1;
-  const FingerModel deaf(plate, settings, {});
+  const FingerModel deaf(plate, settings);
   std::vector<double> taken(rig::kTaxels);
   std::vector<int> silent(rig::kTaxels);
   const std::vector<double> rest = deaf.volts({.x_mm = 18, .y_mm = 54, .z_mm = 5}, 0);
@@ -263,10 +263,10 @@ TEST(FingerModel, TheMountLiftsTheOtherRowsOffThePlate) {
   const double crest = plate.crests()[0];
   const FingerPose on_bump{
       .x_mm = 18, .y_mm = crest - TaxelArray{}.y_mm(12), .z_mm = -0.35};  // row 3 on the bump
-  EXPECT_GT(FingerModel(plate, clean(), {}).loads(on_bump)[0], 0.1);
-  EXPECT_EQ(FingerModel(plate, yielding, {}).loads(on_bump)[0], 0);
-  EXPECT_GT(FingerModel(plate, yielding, {}).loads(on_bump)[12], 0.1);
-  EXPECT_GT(FingerModel(plate, yielding, {}).loads({.x_mm = 18, .y_mm = 20, .z_mm = -0.35})[0], 0.01);
+  EXPECT_GT(FingerModel(plate, clean()).loads(on_bump)[0], 0.1);
+  EXPECT_EQ(FingerModel(plate, yielding).loads(on_bump)[0], 0);
+  EXPECT_GT(FingerModel(plate, yielding).loads(on_bump)[12], 0.1);
+  EXPECT_GT(FingerModel(plate, yielding).loads({.x_mm = 18, .y_mm = 20, .z_mm = -0.35})[0], 0.01);
 }
 
 }  // namespace supertac::simulator_test
