@@ -131,7 +131,7 @@ void declare(Arguments& arguments) {
       .writes()
       .option("plates", "NAME,...",
               "plates of the rig (3_Bumps, ...), plain, kind and pitch in mm (ridges6), or FILE.stl",
-              joined(default_plates()))
+              "bumps12,bumps6,bumps4,ridges12,ridges6,ridges4")
       .option("speeds", "MM_PER_S,...", "sliding speeds in mm/s", "5,10")
       .option("trials", "N", "trials of every plate and speed", "2")
       .option("passes", "N", "passes of every trial, 5 mm apart in x (at most 8)", "8")

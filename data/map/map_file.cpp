@@ -15,29 +15,26 @@ namespace {
 constexpr int kLongestPixels = 720, kMostCellPixels = 8, kGap = 6;
 constexpr Rgb kGrey = {200, 200, 200}, kBlack = {0, 0, 0};
 
-struct PanelOf {
+// What a map says of each of its cells: its name in files, and in pictures.
+struct Part {
+  const char* name;
   std::string heading;
-  const NamedMap* map;
-  const std::vector<float>* values;
+  std::span<const float> cells;
 };
 
-std::vector<PanelOf> panels_of(const std::vector<NamedMap>& maps) {
-  std::vector<PanelOf> panels;
-  for (const NamedMap& map : maps) {
-    panels.push_back({map.name, &map, &map.cells.values});
-    if (!map.cells.errors.empty()) panels.push_back({"off by", &map, &map.cells.errors});
-    if (!map.truth.empty()) panels.push_back({"true", &map, &map.truth});
-  }
-  return panels;
+std::vector<Part> parts_of(const NamedMap& map) {
+  std::vector<Part> parts = {{"values", map.name, map.cells.values}};
+  if (!map.cells.errors.empty()) parts.push_back({"errors", "off by", map.cells.errors});
+  if (!map.truth.empty()) parts.push_back({"truth", "true", map.truth});
+  return parts;
 }
 
 // y to the right, x upwards.
-void draw(Picture& picture, int top, const PanelOf& panel, int dots) {
-  const MapRegion& region = panel.map->cells.region;
+void draw(Picture& picture, int top, const MapRegion& region, std::span<const float> cells, int dots) {
   const auto columns = static_cast<int>(region.height), rows = static_cast<int>(region.width);
   for (int y = 0; y < rows * dots; ++y) {
     for (int x = 0; x < columns * dots; ++x) {
-      const float value = (*panel.values)[static_cast<std::size_t>(x / dots * rows + rows - 1 - y / dots)];
+      const float value = cells[static_cast<std::size_t>(x / dots * rows + rows - 1 - y / dots)];
       picture.set(x, top + y, std::isnan(value) ? kGrey : colour_of(value));
     }
   }
@@ -58,25 +55,25 @@ void draw_scale(Picture& picture, int top, double dots_a_mm) {
 }
 
 Picture picture_of(const std::vector<NamedMap>& maps) {
-  const std::vector<PanelOf> panels = panels_of(maps);
-  std::int64_t longest = 1, height = 0;
-  for (const PanelOf& p : panels) longest = std::max(longest, p.map->cells.region.height);
+  std::int64_t longest = 1, height = 8 + kLineHeight;
+  for (const NamedMap& map : maps) longest = std::max(longest, map.cells.region.height);
   const auto dots = static_cast<int>(std::clamp<std::int64_t>(kLongestPixels / longest, 1, kMostCellPixels));
-  for (const PanelOf& p : panels) height += p.map->cells.region.width * dots + kGap;
+  for (const NamedMap& map : maps)
+    height += static_cast<std::int64_t>(parts_of(map).size()) * (map.cells.region.width * dots + kGap);
   const std::int64_t width = std::max<std::int64_t>(longest * dots, 80);
-  height += 8 + kLineHeight;
   constexpr std::int64_t kMost = 65535;
   Picture inside(static_cast<int>(std::min(width, kMost + 1)), static_cast<int>(std::min(height, kMost + 1)));
   Captions captions{.title = "The surface that was felt, y to the right, x upwards",
                     .low = "0: flat plate",
                     .high = "1: plate's highest"};
   int top = 0;
-  for (const PanelOf& p : panels) {
-    draw(inside, top, p, dots);
-    const int tall = static_cast<int>(p.map->cells.region.width) * dots;
-    captions.rows.push_back({top + tall / 2, p.heading});
-    top += tall + kGap;
-  }
+  for (const NamedMap& map : maps)
+    for (const auto& [name, heading, cells] : parts_of(map)) {
+      draw(inside, top, map.cells.region, cells, dots);
+      const int tall = static_cast<int>(map.cells.region.width) * dots;
+      captions.rows.push_back({top + tall / 2, heading});
+      top += tall + kGap;
+    }
   draw_scale(inside, top + 2, dots / maps.front().cell_mm.y);
   return captioned(inside, captions);
 }
@@ -91,14 +88,10 @@ void write_tensors(const OutputPath& output, const std::vector<NamedMap>& maps) 
     const MapRegion& r = map.cells.region;
     metadata[map.name + ".corner_mm"] =
         pair_text(static_cast<double>(r.left) * map.cell_mm.x, static_cast<double>(r.bottom) * map.cell_mm.y);
-    const std::pair<const char*, std::span<const float>> parts[] = {
-        {".values", map.cells.values}, {".errors", map.cells.errors}, {".truth", map.truth}};
-    for (const auto& [part, cells] : parts)
-      if (!cells.empty())
-        tensors.push_back({map.name + part,
-                           "F32",
-                           {static_cast<std::uint64_t>(r.height), static_cast<std::uint64_t>(r.width)},
-                           std::as_bytes(cells)});
+    const std::vector<std::uint64_t> shape = {static_cast<std::uint64_t>(r.height),
+                                              static_cast<std::uint64_t>(r.width)};
+    for (const auto& [part, heading, cells] : parts_of(map))
+      tensors.push_back({map.name + "." + part, "F32", shape, std::as_bytes(cells)});
   }
   write_safetensors(output, metadata, tensors);
 }

@@ -36,10 +36,11 @@ Taps linear(double at) {
   return {at < 0 ? -2 : -1, {0, 1 - f, f, 0}};
 }
 
-// out[m][n] = picture at (m, n), moved by the taps; pixels beyond an edge are as the edge. rows: scratch.
-void interpolate(std::span<const float> picture, const ImageGrid& grid, const Taps& x, const Taps& y,
-                 std::vector<double>& rows, std::vector<double>& out) {
+// [m][n] = picture at (m, n), moved by the taps; pixels beyond an edge are as the edge.
+std::vector<double> interpolated(std::span<const float> picture, const ImageGrid& grid, const Taps& x,
+                                 const Taps& y) {
   const int height = grid.height, width = grid.width;
+  std::vector<double> rows(grid.pixels()), out(grid.pixels());
   const auto clamped = [](int i, int count) { return static_cast<std::size_t>(std::clamp(i, 0, count - 1)); };
   const auto row_of = [width](auto&& values, std::size_t r) {
     return values.data() + r * static_cast<std::size_t>(width);
@@ -47,21 +48,19 @@ void interpolate(std::span<const float> picture, const ImageGrid& grid, const Ta
   for (int r = 0; r < height; ++r) {
     const float* from = row_of(picture, static_cast<std::size_t>(r));
     double* to = row_of(rows, static_cast<std::size_t>(r));
-    for (int n = 0; n < width; ++n) {
-      to[n] = 0;
+    for (int n = 0; n < width; ++n)
       for (int t = 0; t < 4; ++t)
         to[n] += x.weight[static_cast<std::size_t>(t)] * double{from[clamped(n + x.first + t, width)]};
-    }
   }
   for (int m = 0; m < height; ++m) {
     double* to = row_of(out, static_cast<std::size_t>(m));
-    std::fill_n(to, width, 0.0);
     for (int t = 0; t < 4; ++t) {
       const double* from = row_of(rows, clamped(m + y.first + t, height));
       const double weight = y.weight[static_cast<std::size_t>(t)];
       for (int n = 0; n < width; ++n) to[n] += weight * from[n];
     }
   }
+  return out;
 }
 
 // The cells under a picture along one side: as many as it has pixels, from `first` on, their centres `at`
@@ -95,10 +94,7 @@ SurfaceMap::SurfaceMap(const ImageGrid& grid, bool grows)
     : grid_(grid),
       grows_(grows),
       side_mm_(std::sqrt(grid.width_mm() * grid.height_mm())),
-      most_growth_(same_bits::exp(1 / kMemory)),
-      rows_(grid.pixels()),
-      values_(grid.pixels()),
-      errors_(grid.pixels()) {}
+      most_growth_(same_bits::exp(1 / kMemory)) {}
 
 // The way since the picture before; a jump ends all visits.
 double SurfaceMap::step(double x_mm, double y_mm) {
@@ -152,18 +148,19 @@ void SurfaceMap::add(double x_mm, double y_mm, std::span<const float> picture,
   newest_ = covered, felt_ = felt_.with(covered), has_errors_ = !errors.empty();
   const double way = step(x_mm, y_mm), counts = std::min(way, std::min(pixel.x, pixel.y)) + kStandingMm;
   const double growth = grows_ ? same_bits::exp(way / (kMemory * side_mm_)) : 1;
-  interpolate(picture, grid_, cubic(x.at), cubic(y.at), rows_, values_);
-  if (has_errors_) interpolate(errors, grid_, linear(x.at), linear(y.at), rows_, errors_);
+  const std::vector<double> values = interpolated(picture, grid_, cubic(x.at), cubic(y.at)),
+                            off = has_errors_ ? interpolated(errors, grid_, linear(x.at), linear(y.at))
+                                              : std::vector<double>{};
   for (std::int64_t m = 0; m < grid_.height; ++m) {
     Cell* cell = &cells_[index(x.first, y.first + m)];
     const std::size_t row = static_cast<std::size_t>(m * grid_.width);
     for (std::size_t n = row; n < row + static_cast<std::size_t>(grid_.width); ++n, ++cell) {
       cell->growth = cell->seen + 1 == number_ ? std::min(growth * cell->growth, most_growth_) : 1;
       cell->seen = number_;
-      const double error = has_errors_ ? std::max(errors_[n], kLeastError) : 1;
+      const double error = has_errors_ ? std::max(off[n], kLeastError) : 1;
       const double weight = counts * cell->growth / error;
       cell->weight += weight;
-      cell->value += weight * values_[n];
+      cell->value += weight * values[n];
       cell->error += weight * error;
     }
   }

@@ -82,10 +82,9 @@ class SurfaceMap {
   bool grows_, has_errors_ = false;
   double side_mm_, most_growth_;
   MapRegion stored_, felt_, newest_;
-  std::vector<Cell> cells_;                     // of stored_
-  std::uint64_t pictures_ = 0, number_ = 0;     // how many; of the newest, two more behind a jump
-  double x_mm_ = 0, y_mm_ = 0;                  // of the newest
-  std::vector<double> rows_, values_, errors_;  // of add()
+  std::vector<Cell> cells_;                  // of stored_
+  std::uint64_t pictures_ = 0, number_ = 0;  // how many; of the newest, two more behind a jump
+  double x_mm_ = 0, y_mm_ = 0;               // of the newest
 };
 
 }  // namespace supertac

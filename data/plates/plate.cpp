@@ -213,12 +213,6 @@ Plate::Plate(std::string name, Surface surface, PlateExtent extent)
       surface_(std::make_shared<const Surface>(std::move(surface))),
       extent_(std::move(extent)) {}
 
-const std::vector<std::string>& default_plates() {
-  static const std::vector<std::string> kNames = {"bumps12",  "bumps6",  "bumps4",
-                                                  "ridges12", "ridges6", "ridges4"};
-  return kNames;
-}
-
 bool resemble(const Plate& a, const Plate& b) {
   constexpr double kSamePitchMm = 0.5;
   for (const Texture& t : a.textures())

@@ -85,9 +85,6 @@ class Plate {
   std::vector<Texture> textures_ = {};
 };
 
-/// Names of the six plates that simulations use by default: the paper's bumps and ridges at 12, 6 and 4 mm.
-const std::vector<std::string>& default_plates();
-
 /// The plate called "random<number>": what networks for unseen plates are trained and tested on. Kind, layout
 /// and sizes are drawn from the number alone:
 ///   plain                                                            1 in 16

@@ -201,8 +201,6 @@ std::vector<std::string> BodyFit::lines() const {
   return lines;
 }
 
-BodyFitter::~BodyFitter() = default;
-
 BodyFitter::BodyFitter(const Sensor& sensor, std::uint64_t seed) : sensor_(sensor) {
   const double pitch = std::sqrt(sensor.array.pitch_mm.x * sensor.array.pitch_mm.y);
   std::vector<std::vector<double>> statistics(kSimulations), forms(kSimulations);
@@ -227,7 +225,7 @@ BodyFitter::BodyFitter(const Sensor& sensor, std::uint64_t seed) : sensor_(senso
     throw std::runtime_error("a body cannot be fitted to " + format(sensor.rate_hz) +
                              " frames a second: of half a minute too few would be touched; leave the fit "
                              "out, and presses are simulated of bodies as different as arrays are");
-  regression_ = std::make_unique<const Regression>(statistics, forms);
+  regression_ = std::make_shared<const Regression>(statistics, forms);
 }
 
 BodyFit BodyFitter::operator()(const Recording& touches) const {

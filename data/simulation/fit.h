@@ -40,9 +40,6 @@ class BodyFitter {
   static constexpr int kSimulations = 480;
   /// Throws std::runtime_error where half a minute of its frames has too few of a touch.
   BodyFitter(const Sensor& sensor, std::uint64_t seed);
-  ~BodyFitter();
-  BodyFitter(const BodyFitter&) = delete;
-  BodyFitter& operator=(const BodyFitter&) = delete;
   /// Applies this to touches of the sensor. The deviation is that of the nearest simulated bodies, each left
   /// out of its own regression; a number whose deviation is over .6 of what was drawn could not be told:
   /// crosstalk and creep are left out then, since most arrays have none, and the rest is kept with that
@@ -56,7 +53,7 @@ class BodyFitter {
  private:
   class Regression;
   Sensor sensor_;
-  std::unique_ptr<const Regression> regression_;
+  std::shared_ptr<const Regression> regression_;
 };
 
 }  // namespace supertac

@@ -169,8 +169,6 @@ class Press {
 
 Recording simulate_presses(const Sensor& sensor, const Presses& presses, std::uint64_t seed) {
   const int scale = presses.scale;
-  if (scale != 2 && scale != 4 && scale != 8 && scale != 16)
-    throw std::invalid_argument("presses: scale must be 2, 4, 8 or 16, got " + std::to_string(scale));
   if (sensor.array.channels != 1 && sensor.array.channels != 3)
     throw std::invalid_argument("presses: expected an array of one channel or three axes, got " +
                                 sensor.array.text());

@@ -84,8 +84,8 @@ constexpr int kFramesOfAPress = 6;
 /// noise of .2 to 1 % of the range - and so is what it knows with an uncertainty; every press is up to a
 /// quarter weaker or stronger, and every taxel 5 % by itself. Silent taxels are filled as live ones are. The
 /// recording has truth, group and plate (the kind) and source "simulated". Deterministic in (sensor, presses,
-/// seed), on any processor. Throws std::invalid_argument for an unknown kind, a scale other than 2, 4, 8 or
-/// 16, or an array of other than one or three channels.
+/// seed), on any processor. Throws std::invalid_argument for an unknown kind, or an array of other than
+/// one or three channels.
 Recording simulate_presses(const Sensor& sensor, const Presses& presses, std::uint64_t seed);
 
 /// Somebody presses here and there for so long: scenes as of simulate_presses(), of 0.4 to 2.5 s, at the

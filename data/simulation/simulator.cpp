@@ -66,7 +66,7 @@ std::uint64_t pass_stream(const Plate& plate, const PassSettings& pass) {
 
 FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const PassSettings& of_pass,
                          std::uint64_t seed)
-    : settings_(settings), noise_seed_(seed), noise_stream_(pass_stream(plate, of_pass) + 1) {
+    : settings_(settings), noise_(seed, pass_stream(plate, of_pass) + 1) {
   settings.array.check();
   if (settings.array.channels != 1 && settings.array.channels != 3)
     throw std::invalid_argument("simulator: expected an array of one channel or three axes, got " +
@@ -214,10 +214,9 @@ std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) co
       volts[3 * k + 1] = disturbed(k, lean_y[k] - kFriction * load[k]) - kMiddleVolts;
     }
   }
-  const RandomStream noise(noise_seed_, noise_stream_);
   const auto tick = static_cast<std::uint64_t>(std::llround(std::max(0.0, time_s) * 1e6));
   for (std::size_t s = 0; settings_.noise_volts > 0 && s < volts.size(); ++s)
-    volts[s] += settings_.noise_volts * noise.normal(tick * volts.size() + s);
+    volts[s] += settings_.noise_volts * noise_.normal(tick * volts.size() + s);
   return volts;
 }
 
@@ -288,22 +287,6 @@ std::vector<double> averaged(const std::vector<double>& newest, std::size_t leng
   return mean;
 }
 
-Recording describe(const Plate& plate, const PassSettings& pass, const SimulatorSettings& settings,
-                   std::uint64_t seed) {
-  Recording recording;
-  recording.array = settings.array;
-  recording.body = settings.body;
-  recording.plate = plate.name();
-  recording.trial = pass.trial;
-  recording.pass = pass.pass;
-  recording.speed_mm_s = pass.speed_mm_s;
-  recording.source = "simulated";
-  recording.metadata["seed"] = std::to_string(seed);
-  recording.metadata["rate_hz"] = format(settings.rate_hz);
-  recording.metadata["filter_s"] = format(settings.filter_s);
-  return recording;
-}
-
 }  // namespace
 
 Recording simulate_pass(const Plate& plate, const PassSettings& pass, const SimulatorSettings& settings,
@@ -312,20 +295,27 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
   const FingerModel finger(plate, settings, pass, seed);
   const double duration = 2 * kLiftS + slide_s(pass) + return_s(pass);
   const auto frames = static_cast<std::size_t>(std::floor(duration * settings.rate_hz + 0.5));
-  // Timing faults have a stream of their own for each pass, so that a loss in one pass does not move
-  // another's.
-  const RandomStream timing(seed, stream_named("time") + finger.noise_stream());
+  // Rocking, jitter and losses have streams of their own for each pass, so that a loss in one pass does not
+  // move another's.
+  const std::uint64_t stream = pass_stream(plate, pass) + 1;
+  const RandomStream timing(seed, stream_named("time") + stream);
   const auto length =
       static_cast<std::size_t>(std::max(1L, std::lround(settings.filter_s * settings.rate_hz)));
   std::deque<std::vector<double>> recent;
   BodyResponse response(settings.body, settings.array);
-  Recording recording = describe(plate, pass, settings, seed);
+  Recording recording;
+  recording.array = settings.array, recording.body = settings.body, recording.plate = plate.name();
+  recording.trial = pass.trial, recording.pass = pass.pass, recording.speed_mm_s = pass.speed_mm_s;
+  recording.source = "simulated";
+  recording.metadata["seed"] = std::to_string(seed);
+  recording.metadata["rate_hz"] = format(settings.rate_hz);
+  recording.metadata["filter_s"] = format(settings.filter_s);
   for (std::size_t i = 0; i < frames; ++i) {
     const double stamp = static_cast<double>(i) / settings.rate_hz;
     const double taken = stamp + settings.jitter_s * timing.normal(2 * i);
     FingerPose felt = pose_at(taken, pass);
     felt.z_mm += finger.slide_z_mm();
-    wander(settings.wander, seed, finger.noise_stream(), felt);
+    wander(settings.wander, seed, stream, felt);
     std::vector<double> volts = finger.volts(felt, taken);
     if (settings.with_adc)
       for (double& v : volts) v = rig::volts_of(rig::adc_of(v));

@@ -7,6 +7,7 @@
 
 #include "data/plates/plate.h"
 #include "data/recordings/recording.h"
+#include "io/numbers/random.h"
 
 namespace supertac {
 
@@ -96,9 +97,6 @@ class FingerModel {
   /// the flat plate and touches only the texture.
   double slide_z_mm() const { return -indentation_mm_; }
 
-  /// Random stream of this pass, for what the simulator adds: rocking, jitter, losses.
-  std::uint64_t noise_stream() const { return noise_stream_; }
-
  private:
   double surface(double x_mm, double y_mm) const;
   std::vector<double> indented(const FingerPose& pose) const;  // d(u), negative where nothing touches
@@ -107,7 +105,7 @@ class FingerModel {
   void shape_pad(double slope_x, double slope_y);
 
   SimulatorSettings settings_;
-  std::uint64_t noise_seed_ = 0, noise_stream_ = 0;
+  RandomStream noise_;
   std::vector<double> gain_, threshold_, rest_, drift_;  // per taxel
   double indentation_mm_ = 0, vibration_phase_ = 0, emi_phase_ = 0;
   std::vector<double> map_;                      // surface on a grid, x fastest

@@ -112,14 +112,12 @@ Picture::Picture(int w, int h, Rgb background) : width(w), height(h) {
 }
 
 Rgb Picture::at(int x, int y) const {
-  const std::size_t i =
-      (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)) * 3;
+  const std::size_t i = first(x, y);
   return {rgb.at(i), rgb.at(i + 1), rgb.at(i + 2)};
 }
 
 void Picture::set(int x, int y, Rgb colour) {
-  const std::size_t i =
-      (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)) * 3;
+  const std::size_t i = first(x, y);
   for (std::size_t c = 0; c < 3; ++c) rgb.at(i + c) = colour[c];
 }
 

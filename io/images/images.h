@@ -29,6 +29,11 @@ struct Picture {
   /// (x, y) must lie in the picture; past its last pixel both throw std::out_of_range.
   Rgb at(int x, int y) const;
   void set(int x, int y, Rgb colour);
+
+ private:
+  std::size_t first(int x, int y) const {
+    return 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
+  }
 };
 
 /// What a panel of a grid shows: values [rows][columns], y upwards: row 0, the smallest y, is at the bottom.

@@ -69,8 +69,6 @@ TEST(Plate, GenericNamesSetPitchAndHeight) {
 
   EXPECT_EQ(Plate::named("plain").height(18, 54), 0);
   EXPECT_EQ(Plate::named("plain").max_height(), 0);
-  EXPECT_EQ(default_plates().size(), 6u);
-  for (const auto& name : default_plates()) EXPECT_GT(Plate::named(name).max_height(), 0) << name;
 }
 
 TEST(Plate, MixedPlatesShareTheLength) {
