@@ -6,7 +6,6 @@
 #include <pthread.h>
 #include <sys/random.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -48,26 +47,13 @@ std::string random_token() {
                            ": " + problem);
 }
 
-int listening_socket(WebAddress& address) {
+sockaddr_in place_of(const WebAddress& address) {
   sockaddr_in place{};
   place.sin_family = AF_INET;
   place.sin_port = htons(address.port);
   if (inet_pton(AF_INET, address.bind.c_str(), &place.sin_addr) != 1)
     refuse(address, "expected a numeric address of this computer, such as 127.0.0.1 or 0.0.0.0");
-  const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const int on = 1;
-  if (file < 0) refuse(address, strerror(errno));
-  setsockopt(file, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-  setsockopt(file, SOL_SOCKET, SO_SNDBUF, &kSendBuffer, sizeof kSendBuffer);  // connections inherit it
-  socklen_t size = sizeof place;
-  if (bind(file, reinterpret_cast<sockaddr*>(&place), size) != 0 || listen(file, SOMAXCONN) != 0 ||
-      getsockname(file, reinterpret_cast<sockaddr*>(&place), &size) != 0) {
-    const std::string why = strerror(errno);
-    close(file);
-    refuse(address, why + "; choose another port with --web PORT");
-  }
-  address.port = ntohs(place.sin_port);
-  return file;
+  return place;
 }
 
 std::string_view header(MHD_Connection* connection, const char* name) {
@@ -114,13 +100,17 @@ std::optional<WebAddress> web_address(const Arguments& a) {
   return address;
 }
 
-/// An open connection.
+/// An open connection, and what a page that gets events has heard.
 struct WebServer::Peer {
+  WebServer& server;
   MHD_Connection* connection;
   double came_s;
-  bool asks = false;         // a request is being answered
-  bool leaves = false;       // it was told to
-  Reader* reader = nullptr;  // of a page that gets events
+  bool asks = false;    // a request is being answered
+  bool leaves = false;  // it was told to
+  bool reads = false;   // events
+  bool waits = false;   // has taken the newest one
+  std::uint64_t seen = 0;
+  std::string left = {};  // of an event that has not been taken whole
 
   static Peer& of(MHD_Connection* connection) {
     return *static_cast<Peer*>(
@@ -128,48 +118,37 @@ struct WebServer::Peer {
   }
   static void come_or_go(void* self, MHD_Connection* connection, void** peer,
                          MHD_ConnectionNotificationCode code) {
-    std::list<Peer>& all = static_cast<WebServer*>(self)->peers_;
+    auto& server = *static_cast<WebServer*>(self);
     if (code == MHD_CONNECTION_NOTIFY_STARTED)
-      *peer = &all.emplace_back(Peer{connection, seconds_now()});
+      *peer = &server.peers_.emplace_back(Peer{server, connection, seconds_now()});
     else
-      all.remove_if([peer](const Peer& p) { return &p == *peer; });
+      server.peers_.remove_if([peer](const Peer& p) { return &p == *peer; });
   }
   static void has_answer(void*, MHD_Connection* connection, void**, MHD_RequestTerminationCode) {
     of(connection).asks = false;
   }
-};
-
-struct WebServer::Reader {
-  WebServer& server;
-  MHD_Connection* connection;
-  std::uint64_t seen = 0;
-  std::string left;  // of an event that has not been taken whole
-
   static ssize_t read(void* self, std::uint64_t, char* buffer, std::size_t most) {
-    return static_cast<Reader*>(self)->take(buffer, most);
-  }
-  static void end(void* self) {
-    auto* reader = static_cast<Reader*>(self);
-    std::erase(reader->server.waiting_, reader);
-    Peer::of(reader->connection).reader = nullptr;
-    delete reader;
+    return static_cast<Peer*>(self)->take(buffer, most);
   }
 
   ssize_t take(char* buffer, std::size_t most) {
-    if (Peer::of(connection).leaves) return MHD_CONTENT_READER_END_WITH_ERROR;
+    reads = true;
+    if (leaves) return MHD_CONTENT_READER_END_WITH_ERROR;
     if (left.empty() && server.number_ > seen) {
       left = server.newest_;
       seen = server.number_;
     }
     if (left.empty()) {
-      server.waiting_.push_back(this);
+      waits = true;
       MHD_suspend_connection(connection);
       return 0;
     }
-    const std::size_t count = std::min(most, left.size());
-    std::copy_n(left.begin(), count, buffer);
+    const std::size_t count = left.copy(buffer, most);
     left.erase(0, count);
     return static_cast<ssize_t>(count);
+  }
+  void wake() {
+    if (std::exchange(waits, false)) MHD_resume_connection(connection);
   }
 };
 
@@ -197,8 +176,8 @@ struct WebRequest {
       return text(403, "the request comes from another page");
     if (method == "POST") return act();
     if (method != "GET" && method != "HEAD") return text(405, "expected GET or POST");
-    if (path == "/") return still("text/html; charset=utf-8", server.site_.page);
-    if (path == "/link.js") return still("text/javascript; charset=utf-8", link_script());
+    if (path == "/") return text(200, server.site_.page, "text/html; charset=utf-8");
+    if (path == "/link.js") return text(200, link_script(), "text/javascript; charset=utf-8");
     if (path == "/events") return events();
     return text(404, "there is nothing of this name");
   }
@@ -218,24 +197,18 @@ struct WebRequest {
     return text(200, action->second());
   }
 
-  MHD_Result still(const char* type, std::string_view body) {
-    return send(
-        200, type,
-        MHD_create_response_from_buffer(body.size(), const_cast<char*>(body.data()), MHD_RESPMEM_PERSISTENT));
-  }
-
   MHD_Result events() {
-    auto* reader = new WebServer::Reader{server, connection, 0, server.first_event()};
-    WebServer::Peer::of(connection).reader = reader;
-    return send(200, "text/event-stream",
-                MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 4096, &WebServer::Reader::read, reader,
-                                                  &WebServer::Reader::end));
+    WebServer::Peer& peer = WebServer::Peer::of(connection);
+    peer.left = server.first_event();
+    return send(
+        200, "text/event-stream",
+        MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 4096, &WebServer::Peer::read, &peer, nullptr));
   }
 
-  MHD_Result text(unsigned status, const std::string& line) {
+  MHD_Result text(unsigned status, std::string_view body, const char* type = "text/plain; charset=utf-8") {
     return send(
-        status, "text/plain; charset=utf-8",
-        MHD_create_response_from_buffer(line.size(), const_cast<char*>(line.data()), MHD_RESPMEM_MUST_COPY));
+        status, type,
+        MHD_create_response_from_buffer(body.size(), const_cast<char*>(body.data()), MHD_RESPMEM_MUST_COPY));
   }
 
   MHD_Result send(unsigned status, const char* type, MHD_Response* response) {
@@ -258,17 +231,18 @@ struct WebRequest {
 
 WebServer::WebServer(const WebAddress& address, WebSite site)
     : address_(address), site_(std::move(site)), token_(random_token()) {
-  const int file = listening_socket(address_);
+  const sockaddr_in place = place_of(address_);
   // Not with epoll: it would see no end of a connection that was closed behind half a request.
   daemon_ = MHD_start_daemon(MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr, &WebRequest::handle, this,
-                             MHD_OPTION_LISTEN_SOCKET, file, MHD_OPTION_CONNECTION_LIMIT, kConnections,
+                             MHD_OPTION_SOCK_ADDR, &place, MHD_OPTION_CONNECTION_LIMIT, kConnections,
                              MHD_OPTION_CONNECTION_TIMEOUT, kStalledS, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
                              kRequestBytes, MHD_OPTION_NOTIFY_CONNECTION, &Peer::come_or_go, this,
                              MHD_OPTION_NOTIFY_COMPLETED, &Peer::has_answer, nullptr, MHD_OPTION_END);
-  if (daemon_ == nullptr) {
-    close(file);
-    refuse(address_, "the server does not start");
-  }
+  if (daemon_ == nullptr)
+    refuse(address_, std::string(strerror(errno)) + "; choose another port with --web PORT");
+  address_.port = MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_BIND_PORT)->port;
+  const int listening = MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_LISTEN_FD)->listen_fd;
+  setsockopt(listening, SOL_SOCKET, SO_SNDBUF, &kSendBuffer, sizeof kSendBuffer);  // connections inherit it
   thread_ = std::thread([this] { run(); });
 }
 
@@ -300,7 +274,7 @@ void WebServer::publish() {
   }
   ++number_;
   told_s_ = now;
-  for (Reader* reader : std::exchange(waiting_, {})) MHD_resume_connection(reader->connection);
+  for (Peer& peer : peers_) peer.wake();
 }
 
 // Many that come and say nothing, or take nothing, must not keep out the one who works here. Whoever has just
@@ -311,8 +285,7 @@ void WebServer::make_room() {
   const auto silent = [now](const Peer& p) { return !p.leaves && !p.asks && now - p.came_s > kToAskS; };
   const auto not_asking = [this](const Peer& p) { return !p.leaves && !p.asks && &p != &peers_.back(); };
   const auto behind = [this](const Peer& p) {
-    return !p.leaves && p.reader != nullptr &&
-           number_ > p.reader->seen + static_cast<std::uint64_t>(kMostEventsPerS);
+    return !p.leaves && p.reads && number_ > p.seen + static_cast<std::uint64_t>(kMostEventsPerS);
   };
   for (auto open = std::ranges::count_if(peers_, stays); open > static_cast<std::ptrdiff_t>(kMostPeers);
        --open) {
@@ -323,7 +296,7 @@ void WebServer::make_room() {
     peer->leaves = true;
     shutdown(MHD_get_connection_info(peer->connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd,
              SHUT_RDWR);
-    if (std::erase(waiting_, peer->reader) > 0) MHD_resume_connection(peer->connection);
+    peer->wake();
   }
 }
 
@@ -344,7 +317,7 @@ void WebServer::run() {
     make_room();
   }
   if (!farewell_.empty()) say_farewell();
-  for (Reader* reader : std::exchange(waiting_, {})) MHD_resume_connection(reader->connection);
+  for (Peer& peer : peers_) peer.wake();
   MHD_stop_daemon(daemon_);
 }
 
@@ -352,12 +325,10 @@ void WebServer::run() {
 void WebServer::say_farewell() {
   newest_ = farewell_;
   ++number_;
-  for (Reader* reader : std::exchange(waiting_, {})) MHD_resume_connection(reader->connection);
-  const auto readers = [this] {
-    return static_cast<std::size_t>(
-        std::ranges::count_if(peers_, [](const Peer& p) { return p.reader != nullptr; }));
-  };
-  for (const double until = seconds_now() + kFarewellS; waiting_.size() < readers() && seconds_now() < until;)
+  for (Peer& peer : peers_) peer.wake();
+  const auto has_more = [](const Peer& p) { return p.reads && !p.waits; };
+  for (const double until = seconds_now() + kFarewellS;
+       std::ranges::any_of(peers_, has_more) && seconds_now() < until;)
     if (MHD_run_wait(daemon_, 10) == MHD_NO) return;
 }
 

@@ -10,7 +10,6 @@
 #include <string>
 #include <string_view>
 #include <thread>
-#include <vector>
 
 struct MHD_Daemon;
 
@@ -68,7 +67,6 @@ class WebServer {
 
  private:
   friend struct WebRequest;
-  struct Reader;
   struct Peer;
 
   void run();
@@ -86,7 +84,6 @@ class WebServer {
   std::uint64_t number_ = 0;
   double told_s_ = 0;
   std::list<Peer> peers_;  // in the order of their coming
-  std::vector<Reader*> waiting_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };
