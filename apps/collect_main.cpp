@@ -207,26 +207,19 @@ std::unique_ptr<CollectView> web_view(const Arguments& arguments, const Bed& bed
 }
 
 /// What the run will write must not be there: it would be found out when all is done.
-void refuse_taken(const Arguments& arguments, const std::string& out, Recording named, int passes) {
-  const auto taken = [&](int trial) {
-    std::vector<std::string> names = {journal_path(out, named.plate, trial, named.speed_mm_s)};
-    named.trial = trial;
-    for (named.pass = 1; named.pass <= passes && !arguments.force(); ++named.pass)
-      names.push_back(out + "/" + recording_file_name(named));
-    const auto found = std::ranges::find_if(names, [](const std::string& name) {
-      std::error_code error;
-      return fs::exists(fs::symlink_status(name, error));
-    });
-    return found == names.end() ? "" : *found;
-  };
-  const std::string name = taken(named.trial);
-  if (name.empty()) return;
-  int next = named.trial + 1;
-  while (!taken(next).empty()) ++next;
-  throw FileError(name, "exists already; collect with --trial " + std::to_string(next) +
-                            (name.ends_with(".journal")
-                                 ? ", for no journal is replaced (supertac-import --journal recovers one)"
-                                 : ", or pass --force to replace it"));
+void refuse_taken(const Arguments& arguments, const std::string& out, const std::string& journal,
+                  Recording named, int passes) {
+  std::vector<std::string> names = {journal};
+  for (named.pass = 1; named.pass <= passes && !arguments.force(); ++named.pass)
+    names.push_back(out + "/" + recording_file_name(named));
+  for (const std::string& name : names) {
+    std::error_code error;
+    if (!fs::exists(fs::symlink_status(name, error))) continue;
+    throw FileError(
+        name, std::string("exists already; collect with another --trial") +
+                  (name == journal ? ", for no journal is replaced (supertac-import --journal recovers one)"
+                                   : ", or pass --force to replace it"));
+  }
 }
 
 PalpationOutcome collect(const Arguments& arguments, std::unique_ptr<Port> board,
@@ -303,7 +296,7 @@ int run(Arguments& arguments) {
   const FolderLock alone(out);
   Recording named;
   named.plate = plate, named.trial = trial_of(arguments), named.speed_mm_s = settings.bed.plan.speed;
-  refuse_taken(arguments, out, named, settings.bed.plan.passes);
+  refuse_taken(arguments, out, settings.journal, named, settings.bed.plan.passes);
   keep_plate_file(arguments.text("plate"), out);
   const PalpationOutcome outcome = collect(arguments, std::move(board), std::move(printer), settings, mark);
   if (!outcome.complete)

@@ -11,15 +11,13 @@ namespace supertac {
 namespace {
 
 FingerSignals finger_of(const Arguments& arguments) {
-  const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, 1'000'000'000));
   SimulatorSettings simulator;
   // The board does what it does.
   simulator.with_adc = simulator.with_saturation = false;
   simulator.filter_s = 0;
   simulator.drift_volts_per_s = 0;  // grows with the clock, and a rig may run for days
-  const PassSettings pass{.trial = static_cast<int>(arguments.integer("trial", 1, 1000))};
   const Plate plate = read_option("plate", [&] { return Plate::named(arguments.text("plate")); });
-  const FingerModel finger(plate, simulator, pass, seed);
+  const FingerModel finger(plate, simulator);
   return [finger](double x, double y, double z, double t) {
     const auto volts =
         finger.volts({x - rig::kPlate.x, y - rig::kPlate.y, z - rig::kPlate.z + finger.slide_z_mm()}, t);
@@ -37,9 +35,7 @@ void declare(Arguments& arguments) {
                 "plate under the finger (3_Bumps, ..., plain, kind and pitch: ridges6, or FILE.stl)")
       .required("board-link", "PATH", "where to link the board's pseudo-terminal")
       .required("printer-link", "PATH", "where to link the printer's pseudo-terminal")
-      .option("speedup", "X", "time of the rig per time of the wall; give the host the same", "1")
-      .option("trial", "N", "which finger: gains differ from trial to trial", "1")
-      .option("seed", "N", "the same seed gives the same finger", "1");
+      .option("speedup", "X", "time of the rig per time of the wall; give the host the same", "1");
 }
 
 int run(Arguments& arguments) {

@@ -1,18 +1,25 @@
 // supertac-train: recordings in, a model out.
+#include <filesystem>
+#include <fstream>
 #include <map>
+#include <memory>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "apps/ranks/together.h"
-#include "apps/train/run_folder.h"
 #include "apps/train/training_options.h"
+#include "apps/web/pages.h"
 #include "data/recordings/recording.h"
+#include "io/files/file.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 #include "models/training/audit/ledger.h"
 
 namespace supertac {
@@ -66,6 +73,92 @@ nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, cons
           {"split_fingerprint", task.origin.at("split_fingerprint")},
           {"steps", trainer.total_steps()}};
 }
+
+constexpr const char* kLogHeader =
+    "time_s,step,total,reconstruction,kld,l2,ssim,gradient_norm,learning_rate,test_ssim,test_psnr_db\n";
+constexpr std::uint64_t kMaxLogBytes = 64 << 20;
+
+std::string csv(const LogLine& line) {
+  std::string out = format(line.time_s, 3) + "," + std::to_string(line.step);
+  for (const double v : {line.total, line.reconstruction, line.kld, line.l2, line.ssim, line.gradient_norm,
+                         line.learning_rate})
+    out += "," + format(v);
+  out += "," + (line.test_ssim ? format(*line.test_ssim, 5) : "");
+  out += "," + (line.test_psnr_db ? format(*line.test_psnr_db, 3) : "");
+  return out + "\n";
+}
+
+// The log up to a step. A damaged line (the last one of a killed run) is left out.
+std::string read_log(const std::string& path, std::int64_t last_step) {
+  constexpr std::size_t kColumns = 11;
+  std::string log = kLogHeader;
+  if (!std::filesystem::exists(path)) return log;
+  std::istringstream in(read_text_file(path, kMaxLogBytes));
+  std::string line;
+  std::getline(in, line);  // the header
+  while (std::getline(in, line)) {
+    const std::vector<std::string> fields = comma_list(line + ",");
+    const auto step = fields.size() == kColumns ? parse_int(fields[1]) : std::nullopt;
+    if (step && *step <= last_step) log += line + "\n";
+  }
+  return log;
+}
+
+// What a training run leaves behind besides the model: settings.json, log.csv, last.safetensors, report.html.
+class RunFolder {
+ public:
+  /// run_folder_of() a model. A new run refuses an existing one unless `force`; a resumed run keeps the log's
+  /// lines up to `resumed_step`. Throws FileError.
+  RunFolder(const std::string& model_file, bool force, std::optional<std::int64_t> resumed_step)
+      : path_(run_folder_of(model_file)) {
+    if (path_ == model_file)
+      throw FileError(path_,
+                      "a name that ends in .run is that of the folder beside a model; choose another --out");
+    if (std::filesystem::exists(path_) && !force && !resumed_step)
+      throw FileError(path_, "is the folder of an earlier run; " +
+                                 (std::filesystem::exists(checkpoint_path())
+                                      ? "resume it with --resume " + checkpoint_path() + ", "
+                                      : std::string()) +
+                                 "overwrite it with --force, or choose another --out");
+    make_directories(path_);
+    lock_ = std::make_unique<FolderLock>(path_);
+    log_ = resumed_step ? read_log(log_path(), *resumed_step) : kLogHeader;
+    write_file(log_path(), log_);
+  }
+
+  const std::string& path() const { return path_; }
+  std::string checkpoint_path() const { return path_ + "/last.safetensors"; }
+  std::string log_path() const { return path_ + "/log.csv"; }
+  /// Seconds on the clock of the log at its last line; 0 when there is none.
+  double seconds() const {
+    const std::size_t last_line = log_.rfind('\n', log_.size() - 2) + 1;
+    return parse_double(log_.substr(last_line, log_.find(',', last_line) - last_line)).value_or(0);
+  }
+
+  void write_settings(const nlohmann::ordered_json& settings) const {
+    write_file(path_ + "/settings.json", settings.dump(2) + "\n");
+  }
+  /// Appends and flushes. When the disk refuses, returns false, once; later lines are then kept in memory
+  /// only.
+  bool log(const LogLine& line) {
+    log_ += csv(line);
+    if (log_broken_) return true;
+    std::ofstream out(log_path(), std::ios::app);
+    out << csv(line) << std::flush;
+    log_broken_ = !out;
+    return !log_broken_;
+  }
+  /// A page with curves that needs no other file. Throws FileError.
+  void write_report() const {
+    write_file(path_ + "/report.html", result_page({{"title", "SuperTac training"}, {"log", log_}}));
+  }
+
+ private:
+  std::string path_;
+  std::unique_ptr<FolderLock> lock_;
+  std::string log_;
+  bool log_broken_ = false;
+};
 
 class TrainingRun {
  public:
@@ -152,7 +245,7 @@ class TrainingRun {
       loss_ = line.total;
       if (line.step % trainer_.steps_per_epoch() == 0) test_ssim_ = line.test_ssim;
       if (!folder_->log(line))
-        a_.note(folder_->path() + "/log.csv: cannot write; the log is kept in memory only");
+        a_.note(folder_->log_path() + ": cannot write; the log is kept in memory only");
     };
     return callbacks;
   }

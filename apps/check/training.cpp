@@ -8,7 +8,6 @@
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
-#include "apps/train/run_folder.h"
 #include "apps/train/training_options.h"
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
@@ -49,7 +48,7 @@ class Repetition {
   /// Of the model's run folder, as its file says that it was trained. Throws FileError when that does not say
   /// it, when there is no ledger, or when --data holds other recordings.
   Repetition(const Arguments& a, const std::string& model)
-      : folder_(RunFolder::folder_of(model)),
+      : folder_(run_folder_of(model)),
         ledger_(Ledger::read(LedgerFile::path_in(folder_))),
         task_(task_of(a, model)) {
     trainer_.emplace(*task_.windows, task_.split.train, task_.recipe);

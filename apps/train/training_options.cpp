@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "apps/common/running/progress.h"
 #include "io/numbers/numbers.h"
@@ -159,6 +160,10 @@ Recipe recipe_of(const Arguments& a) {
   if (a.given("beta")) r.loss.beta = a.number("beta", 0, 1e6);
   as_usage([&] { r.check(); });
   return r;
+}
+
+std::string run_folder_of(const std::string& model_file) {
+  return std::filesystem::path(model_file).replace_extension(".run").string();
 }
 
 RecordingFolders folders_of(const Arguments& a) {

@@ -86,13 +86,23 @@ class DescriptorPort : public Port {
   throw PortError("port " + printable(address) + ": " + problem);
 }
 
+// The only port with the VID:PID of the rig's board.
+std::string board_port() {
+  std::vector<PortInfo> boards = list_ports();
+  std::erase_if(boards, [](const PortInfo& port) { return port.usb_id != rig::kBoardUsbId; });
+  if (boards.size() == 1) return boards.front().path;
+  throw PortError("port auto: expected one tactile board (USB " + std::string(rig::kBoardUsbId) +
+                  "), found " + std::to_string(boards.size()) + "; plug it in, or name the port");
+}
+
 OpenedPort open_serial(const std::string& address, const std::string& rest, double speedup) {
   const std::size_t at = rest.rfind('@');
   const auto baud = at == std::string::npos ? std::nullopt : parse_uint(rest.substr(at + 1));
   if (!baud || *baud < kLeastBaud || *baud > kMostBaud || at == 0)
     fail(address, "expected serial:DEVICE@BAUD, such as serial:/dev/ttyACM0@115200");
   const SerialSettings settings{.baud = static_cast<unsigned>(*baud), .speedup = speedup};
-  return {std::make_unique<SerialPort>(resolve_board_port(rest.substr(0, at)), settings)};
+  const std::string device = rest.substr(0, at);
+  return {std::make_unique<SerialPort>(device == "auto" ? board_port() : device, settings)};
 }
 
 struct FreeAddresses {

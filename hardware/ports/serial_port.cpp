@@ -188,15 +188,6 @@ std::vector<PortInfo> list_ports() {
   return ports;
 }
 
-std::string resolve_board_port(const std::string& path) {
-  if (path != "auto") return path;
-  std::vector<PortInfo> boards = list_ports();
-  std::erase_if(boards, [](const PortInfo& port) { return port.usb_id != rig::kBoardUsbId; });
-  if (boards.size() == 1) return boards.front().path;
-  throw PortError("port auto: expected one tactile board (USB " + std::string(rig::kBoardUsbId) +
-                  "), found " + std::to_string(boards.size()) + "; plug it in, or name the port");
-}
-
 std::string lasting_port_name(const std::string& path, const std::string& links) {
   std::error_code error;
   const std::string device = fs::weakly_canonical(path, error).string();

@@ -70,10 +70,6 @@ struct PortInfo {
 /// Ports with a device behind them, by name.
 std::vector<PortInfo> list_ports();
 
-/// `path`, or for "auto" the only port with the board's VID:PID. Throws PortError when there is none or
-/// more than one.
-std::string resolve_board_port(const std::string& path);
-
 /// A path that still names the device behind `path` after it was plugged in again: its link in `links` (which
 /// has the device's USB name and serial number), else the device. A pseudo-terminal has no name of its own,
 /// its number goes to the next one opened; there it is `path`, absolute.

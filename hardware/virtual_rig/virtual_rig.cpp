@@ -6,13 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <optional>
 #include <utility>
 
@@ -38,14 +38,11 @@ std::string code_of(const std::string& command) {
 }
 
 void link_at(const std::string& target, const std::string& link) {
-  struct stat info {};
-  if (lstat(link.c_str(), &info) == 0) {
-    if (!S_ISLNK(info.st_mode)) {
-      throw PortError("virtual rig: " + link + " exists and is not a link; choose another path");
-    }
-    if (unlink(link.c_str()) != 0) failed("cannot replace " + link);
-  }
-  if (symlink(target.c_str(), link.c_str()) != 0) failed("cannot link " + link);
+  std::error_code error;
+  if (std::filesystem::is_symlink(link, error)) std::filesystem::remove(link, error);
+  std::filesystem::create_symlink(target, link, error);
+  if (error)
+    throw PortError("virtual rig: cannot link " + link + ": " + error.message() + "; choose another path");
 }
 
 }  // namespace

@@ -122,9 +122,9 @@ TEST(CollectProgram, WhatIsThereAlreadyIsFoundBeforeAnythingMoves) {
   const auto refuse = [&](const std::vector<std::string>& more, const std::string& says) {
     expect_failure(run.collect(more), 1, says);
   };
-  refuse({}, "3_Bumps_t1_p1_v10.safetensors: exists already; collect with --trial 3, or pass --force");
+  refuse({}, "3_Bumps_t1_p1_v10.safetensors: exists already; collect with another --trial, or pass --force");
   refuse({"--trial", "2", "--force"},
-         "3_Bumps_t2_v10.journal: exists already; collect with --trial 3, for no");
+         "3_Bumps_t2_v10.journal: exists already; collect with another --trial, for no");
   EXPECT_EQ(run.head(), before);
 }
 
