@@ -141,31 +141,6 @@ TEST_F(Pipes, AReaderThatHasEnoughHearsNothing) {
   EXPECT_TRUE(contains(bytes("error"), "is the disk full?"));
 }
 
-TEST_F(Errors, AreOneClearLine) {
-  fs::create_symlink("loop", path("loop"));
-  const std::string odd = path("na\xff\x1b[31mme");
-  const std::string huge(5000, 'x');
-  for (const std::string& name : {path("loop"), odd, huge, path("loop/x")}) {
-    for (const std::vector<std::string>& arguments :
-         {std::vector<std::string>{"supertac-info", name},
-          {"supertac-simulate", "--out", name, "--plates", name},
-          {"supertac-import", name, "--out", path("o")},
-          {"supertac-import", "--journal", name, "--out", path("o")},
-          {"supertac-plate", "--plate", name, "--out", path("p")},
-          {"supertac-plate", "--plate", "plain", "--json", name},
-          {"supertac-sweep", "--data", name, "--out", path("o")},
-          {"supertac-evaluate", "--model", name, "--data", name},
-          {"supertac-stream", "--model", name, "--recording", name},
-          {"supertac-train", "--data", name, "--out", path("m")}}) {
-      const auto result = run_process(arguments[0], {arguments.begin() + 1, arguments.end()});
-      EXPECT_TRUE(result.code == 1 || result.code == 2) << arguments[0] << result.code;
-      EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
-      for (const char* raw : {"filesystem error", "[json.", "std::", "\x1b", "basic_"})
-        EXPECT_FALSE(contains(result.error + result.out, raw)) << result.error;
-    }
-  }
-}
-
 // The most memory that a program of this test has held so far, in kB.
 long most_kilobytes() {
   rusage used{};

@@ -36,7 +36,7 @@ GOOD = {
     "train": "--data data --out new.model --epochs 1 --preset tiny",
     "rig": "--plate plain --board-link new.board --printer-link new.printer",
 }
-EVIL = ["", "x\ny", "\x1b[31mred", b"\xff\xfe", "x" * 300, "y" * 5000] + """
+EVIL = ["", "x\ny", "\x1b[31mred", b"\xff\xfe", b"na\xff\x1b[31mme", "loop/x", "x" * 300, "y" * 5000] + """
     0 -1 1 2 nan inf 1e308 1e-308 18446744073709551616 0x10 1,,2 , plain ridges6 ridges0.0000001 ridgesinf bumps-1
     precious precious.stl data data/1 data/good model new new/er loop fifo empty link /dev/null /dev/zero /dev/full
     /proc/self/mem / . .. - -- $(touch${IFS}PWNED) `touch${IFS}PWNED` a;touch${IFS}PWNED
@@ -46,8 +46,8 @@ OUTPUTS = ("--out --json --outputs --capture --report --pictures --onnx --board-
            "--c99").split()
 KEPT = ["precious", "precious.stl", "model", "data/good"]  # what no program may change
 ENDS = {128 + s for s in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)}
-FINDINGS = ["crashes", "hangs", "above 1 GB", "raw exceptions", "control codes", "shells", "files overwritten",
-            "half folders"]
+FINDINGS = ["crashes", "hangs", "not one line", "above 1 GB", "raw exceptions", "control codes", "shells",
+            "files overwritten", "half folders"]
 AS_NOBODY = {"user": 65534, "group": 65534, "extra_groups": []} if os.getuid() == 0 else {}
 
 counts = collections.Counter({name: 0 for name in FINDINGS})
@@ -120,6 +120,9 @@ class Scratch:
         counts[f"exit {code}"] += 1
         if (code > 126 and code not in ENDS) or "Sanitizer" in said or "runtime error:" in said:
             found("crashes")
+        errors = [line.startswith("supertac-") for line in said.splitlines()]
+        if code in (1, 2) and (errors.count(True) != 1 or not errors[-1]):
+            found("not one line")  # remarks may stand before it
         if kilobytes > MOST_KB:
             found("above 1 GB")
         if re.search(r"what\(\):|filesystem error|\[json\.|std::|basic_string|terminate called", said):
