@@ -6,28 +6,6 @@
 #include "io/numbers/numbers.h"
 
 namespace supertac {
-namespace {
-
-nlohmann::ordered_json write_stl(const Arguments& arguments, const Plate& plate) {
-  const std::string path = arguments.text("out");
-  const auto triangles = mesh_of(plate);
-  // Named after no file: the same plate, however it is called, gives the same bytes.
-  const std::string name = Plate::is_file(plate.name()) ? "read from STL" : plate.name();
-  write_file(arguments.output("out"), stl_bytes(triangles, "SuperTac plate " + name + ", mm"));
-  arguments.print(path + ": " + plate.name() + ", heights " + format(plate.min_height(), 2) + " to " +
-                  format(plate.max_height(), 2) +
-                  " mm, texture from y = " + format(plate.texture_begin(), 2) + " to " +
-                  format(plate.texture_end(), 2) + " mm, " + std::to_string(triangles.size()) + " triangles");
-  return {{"file", path},
-          {"triangles", triangles.size()},
-          {"min_height_mm", plate.min_height()},
-          {"max_height_mm", plate.max_height()},
-          {"texture_from_mm", plate.texture_begin()},
-          {"texture_to_mm", plate.texture_end()}};
-}
-
-}  // namespace
-
 void declare(Arguments& arguments) {
   arguments
       .required("plate", "NAME",
@@ -39,7 +17,23 @@ void declare(Arguments& arguments) {
 
 int run(Arguments& arguments) {
   const Plate plate = read_option("plate", [&] { return Plate::named(arguments.text("plate")); });
-  arguments.write_json({{"plate", plate.name()}, {"stl", write_stl(arguments, plate)}});
+  const std::string path = arguments.text("out");
+  const auto triangles = mesh_of(plate);
+  // Named after no file: the same plate, however it is called, gives the same bytes.
+  const std::string name = Plate::is_file(plate.name()) ? "read from STL" : plate.name();
+  write_file(arguments.output("out"), stl_bytes(triangles, "SuperTac plate " + name + ", mm"));
+  arguments.print(path + ": " + plate.name() + ", heights " + format(plate.min_height(), 2) + " to " +
+                  format(plate.max_height(), 2) +
+                  " mm, texture from y = " + format(plate.texture_begin(), 2) + " to " +
+                  format(plate.texture_end(), 2) + " mm, " + std::to_string(triangles.size()) + " triangles");
+  arguments.write_json({{"plate", plate.name()},
+                        {"stl",
+                         {{"file", path},
+                          {"triangles", triangles.size()},
+                          {"min_height_mm", plate.min_height()},
+                          {"max_height_mm", plate.max_height()},
+                          {"texture_from_mm", plate.texture_begin()},
+                          {"texture_to_mm", plate.texture_end()}}}});
   return kExitOk;
 }
 

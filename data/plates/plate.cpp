@@ -148,12 +148,6 @@ Texture parse_texture(std::string_view text, const std::string& name) {
   return t;
 }
 
-std::string generic_name(const std::string& name) {
-  for (const auto& [of_rig, generic] : kRigPlates)
-    if (name == of_rig) return generic;
-  return name;
-}
-
 }  // namespace
 
 bool Plate::is_file(const std::string& name) {
@@ -169,7 +163,9 @@ Plate Plate::named(const std::string& name) {
   if (name.starts_with(kRandom))
     if (const auto number = parse_uint(name.substr(kRandom.size())); number && *number <= UINT32_MAX)
       return random_plate(static_cast<std::uint32_t>(*number));
-  const std::string generic = generic_name(name);
+  const auto* of_rig =
+      std::ranges::find(kRigPlates, name, [](const auto& row) { return std::string_view(row.first); });
+  const std::string generic = of_rig != std::end(kRigPlates) ? of_rig->second : name;
   std::vector<Texture> textures;
   for (std::size_t begin = 0; begin <= generic.size();) {
     const std::size_t end = std::min(generic.find('+', begin), generic.size());

@@ -141,10 +141,6 @@ double FingerModel::surface(double x_mm, double y_mm) const {
   return near + fv * (far - near);
 }
 
-std::vector<double> FingerModel::loads(const FingerPose& pose) const {
-  return felt(indented(pose), across_weights_.load, along_weights_.load);
-}
-
 std::vector<double> FingerModel::indented(const FingerPose& pose) const {
   std::vector<double> depth(rise_.size());
   for (int i = 0; i < across_; ++i)
@@ -158,7 +154,7 @@ std::vector<double> FingerModel::indented(const FingerPose& pose) const {
   // approach the root from below and never pass it; once the same points touch as before, the last step was
   // exact.
   double lift = 0, last_slope = 0;
-  for (int step = 0; settings_.with_mount && step < 12; ++step) {
+  for (int step = 0; step < 12; ++step) {
     double excess = -settings_.mount_stiffness * lift, slope = settings_.mount_stiffness;
     for (const double d : depth) {
       const double indented = std::max(0.0, d - lift);

@@ -21,8 +21,9 @@ struct SimulatorSettings {
   double wander = 0;            ///< how much the finger rocks on its way, see simulate_pass()
   double threshold_mm = 0;      ///< |N(0, 1)| times this is the load of which a taxel feels nothing
 
-  bool with_mount = true;       ///< the finger gives way: a bump under one row lifts the other rows
-  double mount_stiffness = 15;  ///< cubic mm of indented pad per mm, of a flat body as large as the rig's pad
+  /// The finger gives way: a bump under one row lifts the other rows. Cubic mm of indented pad per mm, of a
+  /// flat body as large as the rig's pad.
+  double mount_stiffness = 15;
   Body body = Body::of_rig();  ///< a skin that is not known is the rig's; its shape touches an element before
                                ///< a taxel is above it; its skin is the pad
   bool with_edges = true;      ///< beside the plate there is nothing to touch
@@ -89,9 +90,6 @@ class FingerModel {
 
   /// Voltages [taxels,channels] before ADC, filter and saturation.
   std::vector<double> volts(const FingerPose& pose, double time_s) const;
-
-  /// Load on every taxel, load_k above (mm).
-  std::vector<double> loads(const FingerPose& pose) const;
 
   /// This pass's path height during the slide: minus the indentation. Positive when the finger rides above
   /// the flat plate and touches only the texture.

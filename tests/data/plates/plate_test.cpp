@@ -123,31 +123,22 @@ TEST(PlateFile, NamedReadsAnStlFileAndDropsItsFolder) {
             folder / "other.stl" + ": cannot open the file: No such file or directory; check the name");
 }
 
-TEST(PlateFile, IsKeptBesideTheRecordingsAndNeverReplacedByAnother) {
+TEST(PlateFile, IsKeptBesideTheRecordingsAndNothingElseIsRead) {
   const TemporaryFolder folder;
   make_directories(folder / "out");
   write_plate(folder / "my.stl", "6_Bumps");
-  keep_plate_file("6_Bumps", folder / "out");
-  keep_plate_file(folder / "my.stl", folder / "out");
-  keep_plate_file(folder / "my.stl", folder / "out");
+  for (const std::string& name : {std::string("6_Bumps"), folder / "my.stl", folder / "my.stl"})
+    keep_plate_file(name, folder / "out");
   EXPECT_EQ(plate_in_folder("my.stl", folder / "out").crests().size(), 6u);
   EXPECT_EQ(plate_in_folder("3_Bumps", folder / "out").name(), "3_Bumps");
+  for (const std::string& elsewhere : {"../" + folder.path() + "/my.stl", folder / "my.stl"})
+    EXPECT_REFUSAL(
+        "plate '" + elsewhere + "': expected the name of an STL file beside the recordings, found a path",
+        plate_in_folder(elsewhere, folder.path()));
   write_plate(folder / "my.stl", "3_Bumps");
   EXPECT_EQ(what_of<FileError>([&] { keep_plate_file(folder / "my.stl", folder / "out"); }),
             folder / "out/my.stl" + ": is another plate than " + folder / "my.stl" +
                 "; rename one of them or choose another folder");
-}
-
-TEST(PlateFile, ARecordingMayNotNameAFileElsewhere) {
-  const TemporaryFolder folder;
-  write_plate(folder / "my.stl", "6_Bumps");
-  const auto refused = [&](const std::string& name, const std::string& in) {
-    EXPECT_REFUSAL(
-        "plate '" + name + "': expected the name of an STL file beside the recordings, found a path",
-        plate_in_folder(name, in));
-  };
-  refused("../" + folder.path() + "/my.stl", folder.path());
-  refused(folder / "my.stl", ".");
 }
 
 TEST(PlateFile, WindowsTakeTheirTruthFromIt) {

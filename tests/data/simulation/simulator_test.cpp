@@ -11,7 +11,7 @@ struct Term {
   void (*leave_out)(SimulatorSettings&);
 };
 constexpr Term kTerms[] = {
-    {"mount", [](SimulatorSettings& s) { s.with_mount = false; }},
+    {"mount", [](SimulatorSettings& s) { s.mount_stiffness = 1e12; }},
     {"pad", [](SimulatorSettings& s) { s.body.skin_mm = 0.6; }},
     {"dome", [](SimulatorSettings& s) { s.body.shape = BodyShape::flat, s.body.radius_mm = 0; }},
     {"edges", [](SimulatorSettings& s) { s.with_edges = false; }},
@@ -91,8 +91,8 @@ TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
   }
   // A taxel far outside of the rig's pad still has points to feel with.
   settings.array = {.rows = 16, .columns = 16, .pitch_mm = 5};
-  for (const double load : FingerModel(plate, settings).loads({.x_mm = 18, .y_mm = 54, .z_mm = -1}))
-    EXPECT_TRUE(std::isfinite(load));
+  for (const double v : FingerModel(plate, settings).volts({.x_mm = 18, .y_mm = 54, .z_mm = -1}, 0))
+    EXPECT_TRUE(std::isfinite(v));
   settings.array.channels = 2;
   EXPECT_REFUSAL(
       "simulator: expected an array of one channel or three axes, got 16x16 taxels at 5 mm with 2 channels",
@@ -127,22 +127,22 @@ TEST(Simulator, AThresholdTakesNoMoreThanItself) {
   const FingerModel every(plate, settings);
   settings.threshold_mm = 0.1;
   const FingerModel deaf(plate, settings);
-  std::vector<double> taken(rig::kTaxels);
-  std::vector<int> silent(rig::kTaxels);
   const std::vector<double> rest = deaf.volts({.x_mm = 18, .y_mm = 54, .z_mm = 5}, 0);
-  for (const double z : {0.0, -0.02, -0.05, -0.1, -0.3, -1.0, -2.0}) {
+  std::vector<double> taken(rig::kTaxels), before;
+  std::vector<int> silent(rig::kTaxels);
+  for (const double z : {0.0, -0.02, -0.05, -0.1, -0.3, -1.0, -2.0, -2.5}) {
     const FingerPose pose{.x_mm = 18, .y_mm = 54, .z_mm = z};
-    const auto loads = every.loads(pose), all = every.volts(pose, 0), some = deaf.volts(pose, 0);
+    const auto all = every.volts(pose, 0), some = deaf.volts(pose, 0);
+    before = taken;
     for (std::size_t k = 0; k < taken.size(); ++k) {
-      EXPECT_GE(some[k] - all[k], taken[k] - 1e-12) << k << " at " << z;
       taken[k] = some[k] - all[k];
-      if (loads[k] > 0 && some[k] == rest[k]) ++silent[k];
+      EXPECT_GE(taken[k], before[k] - 1e-12) << k << " at " << z;
+      if (all[k] < rest[k] && some[k] == rest[k]) ++silent[k];
     }
   }
   EXPECT_GT(std::ranges::count_if(silent, [](int n) { return n > 0; }), rig::kTaxels / 2);
   for (std::size_t k = 0; k < taken.size(); ++k) {  // pressed harder still, nothing more is taken
-    const FingerPose pose{.x_mm = 18, .y_mm = 54, .z_mm = -2.5};
-    EXPECT_NEAR(deaf.volts(pose, 0)[k] - every.volts(pose, 0)[k], taken[k], 1e-12) << k;
+    EXPECT_NEAR(taken[k], before[k], 1e-12) << k;
     EXPECT_GT(taken[k], 0) << k;
   }
 }
@@ -259,14 +259,16 @@ TEST(Simulator, RefusesImpossiblePasses) {
 TEST(FingerModel, TheMountLiftsTheOtherRowsOffThePlate) {
   const Plate plate("one", {{"bumps", 40, 2.5}});
   SimulatorSettings yielding = clean();
-  yielding.with_mount = true;
-  const double crest = plate.crests()[0];
-  const FingerPose on_bump{
-      .x_mm = 18, .y_mm = crest - TaxelArray{}.y_mm(12), .z_mm = -0.35};  // row 3 on the bump
-  EXPECT_GT(FingerModel(plate, clean()).loads(on_bump)[0], 0.1);
-  EXPECT_EQ(FingerModel(plate, yielding).loads(on_bump)[0], 0);
-  EXPECT_GT(FingerModel(plate, yielding).loads(on_bump)[12], 0.1);
-  EXPECT_GT(FingerModel(plate, yielding).loads({.x_mm = 18, .y_mm = 20, .z_mm = -0.35})[0], 0.01);
+  yielding.mount_stiffness = SimulatorSettings().mount_stiffness;
+  const double y_mm = plate.crests()[0] - TaxelArray{}.y_mm(12);  // row 3 on the bump
+  const auto drop = [&](const SimulatorSettings& settings, double at_y_mm, std::size_t taxel) {
+    const FingerPose pose{.x_mm = 18, .y_mm = at_y_mm, .z_mm = -0.35};
+    return rig::kRestVolts - FingerModel(plate, settings).volts(pose, 0)[taxel];
+  };
+  EXPECT_GT(drop(clean(), y_mm, 0), 0.045);
+  EXPECT_EQ(drop(yielding, y_mm, 0), 0);
+  EXPECT_GT(drop(yielding, y_mm, 12), 0.045);
+  EXPECT_GT(drop(yielding, 20, 0), 0.0045);
 }
 
 }  // namespace supertac::simulator_test
