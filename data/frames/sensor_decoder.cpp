@@ -62,7 +62,7 @@ class LineDecoder : public SensorDecoder {
   using Line = TextFrames::Result;
   // Of line_: they fill values_ and the frame's time.
   Line read_text(DecodedFrame& frame) {
-    if (const Line result = lines_.push(line_); result != Line::frame) return result;
+    if (const Line result = lines_.push(clean_line(line_)); result != Line::frame) return result;
     const std::vector<TextSlot>& slots = lines_.slots();
     if (slots.size() != count_ + format_.skip.size() + (format_.time ? 1 : 0)) return Line::torn;
     for (std::size_t c = 0; c < slots.size(); ++c) {

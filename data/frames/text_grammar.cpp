@@ -186,6 +186,8 @@ bool none_at(std::string_view line, std::size_t& i) {
 }  // namespace
 
 std::string clean_line(std::string_view line) {
+  const auto stays = [](char c) { return (c >= ' ' && c <= '~') || c == '\t' || c == '\r'; };
+  if (std::ranges::all_of(line, stays)) return std::string(trimmed(line));
   std::string clean;
   clean.reserve(line.size());
   for (std::size_t i = 0; i < line.size(); ++i) {
@@ -278,8 +280,7 @@ unsigned TextChecksum::computed(const std::string& kind) const {
   return checksum_of(kind, std::as_bytes(std::span(line.substr(line.starts_with('$') ? 1 : 0))));
 }
 
-TextFrames::Result TextFrames::push(std::string_view raw) {
-  std::string line = clean_line(raw);
+TextFrames::Result TextFrames::push(std::string_view line) {
   const std::string_view content = format_.lines_per_frame > 1 ? behind_stamp(line) : line;
   const bool many = format_.lines_per_frame > 1, partial = open_ && !lines_.empty();
   const Result before = partial ? Result::torn : Result::nothing;
@@ -295,9 +296,9 @@ TextFrames::Result TextFrames::push(std::string_view raw) {
     const auto sum = checksum_of(line);
     if (!sum || (format_.checksum != "hex" && sum->computed(format_.checksum) != sum->stated))
       return open_ = false, Result::torn;
-    line = std::string(trimmed(sum->line));
+    line = trimmed(sum->line);
   }
-  lines_.push_back(many ? std::string(behind_stamp(line)) : line);
+  lines_.emplace_back(many ? behind_stamp(line) : line);
   if (static_cast<int>(lines_.size()) < format_.lines_per_frame) return begins ? before : Result::nothing;
   slots_.clear();
   for (std::size_t of = 0; of < lines_.size(); ++of)

@@ -71,7 +71,7 @@ class TextFrames {
  public:
   enum class Result { nothing, frame, torn };
   explicit TextFrames(const FrameFormat& format) : format_(format) {}
-  /// What `line` completed; slots() are then its numbers. `torn`: lines that are no frame.
+  /// What a clean line completed; slots() are then its numbers. `torn`: lines that are no frame.
   Result push(std::string_view line);
   const std::vector<TextSlot>& slots() const { return slots_; }
 

@@ -164,7 +164,7 @@ Table text_table(const std::string& path) {
     ++number;
     if (line.starts_with('#')) continue;
     const auto result = frames.push(line);
-    if (!holds_row(line) && result == TextFrames::Result::nothing) continue;
+    if (line.empty() && result == TextFrames::Result::nothing) continue;
     ++lines;
     const auto& slots = frames.slots();
     bool fits = result == TextFrames::Result::frame && slots.size() == table.columns;
