@@ -66,7 +66,7 @@ std::optional<double> wall_time(std::string_view text, std::size_t& i) {
     // "12:00:00,512,498" is a time of whole seconds and two values, unless three or six digits are a fraction
     // of a logger; then the next thing is a blank.
     if (text[k] == '.' || ((end - k == 4 || end - k == 7) && at(text, end) == ' '))
-      seconds += number_of("0." + std::string(text.substr(k + 1, end - k - 1))).value_or(0), k = end;
+      seconds += parse_double("0." + std::string(text.substr(k + 1, end - k - 1))).value_or(0), k = end;
   }
   if (at(text, k) == 'Z') ++k;
   if (dated && (at(text, k) == '+' || at(text, k) == '-') && digit(at(text, k + 1)) && digit(at(text, k + 2)))

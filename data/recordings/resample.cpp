@@ -241,8 +241,4 @@ std::string FeltTaxels::complaint() const {
                   "simulate again");
 }
 
-void FeltTaxels::check() const {
-  if (const std::string found = complaint(); !found.empty()) throw std::runtime_error(found);
-}
-
 }  // namespace supertac

@@ -137,8 +137,6 @@ class FeltTaxels {
   /// "49 of 60 taxels feel nothing: 0-9, 12; ..." and what helps, where that holds of more than three
   /// quarters: of a dome that slides over one strip of a plate half of the taxels feel it. Else nothing.
   std::string complaint() const;
-  /// Throws std::runtime_error with the complaint where there is one.
-  void check() const;
 
  private:
   TaxelArray array_;

@@ -69,32 +69,30 @@ Baseline mean_image(const WindowSet& windows, std::span<const std::uint32_t> tra
           }};
 }
 
-Bicubic::Bicubic(int rows, int columns, int scale)
-    : rows_(static_cast<std::size_t>(rows)),
-      columns_(static_cast<std::size_t>(columns)),
-      down_(weights_of(rows, scale)),
-      across_(weights_of(columns, scale)) {}
-
-void Bicubic::operator()(std::span<const float> frame, std::span<float> out) const {
-  const std::size_t height = down_.size() / rows_, width = across_.size() / columns_;
-  check_size("a frame", frame.size(), rows_ * columns_);
-  check_size("the image", out.size(), height * width);
-  std::vector<float> row(columns_);  // the frame's columns at this row of the image
-  for (std::size_t r = 0; r < height; ++r) {
-    std::fill(row.begin(), row.end(), 0.0F);
-    for (std::size_t k = 0; k < frame.size(); ++k)
-      row[k % columns_] += down_[r * rows_ + k / columns_] * frame[k];
-    for (std::size_t c = 0; c < width; ++c) {
-      float value = 0;
-      for (std::size_t k = 0; k < columns_; ++k) value += across_[c * columns_ + k] * row[k];
-      out[r * width + c] = value;
+std::function<void(std::span<const float>, std::span<float>)> bicubic_enlargement(int rows, int columns,
+                                                                                  int scale) {
+  const auto height = static_cast<std::size_t>(rows), width = static_cast<std::size_t>(columns);
+  return [=, down = weights_of(rows, scale), across = weights_of(columns, scale)](auto frame, auto out) {
+    const std::size_t down_pixels = down.size() / height, across_pixels = across.size() / width;
+    check_size("a frame", frame.size(), height * width);
+    check_size("the image", out.size(), down_pixels * across_pixels);
+    std::vector<float> row(width);  // the frame's columns at this row of the image
+    for (std::size_t r = 0; r < down_pixels; ++r) {
+      std::fill(row.begin(), row.end(), 0.0F);
+      for (std::size_t k = 0; k < frame.size(); ++k)
+        row[k % width] += down[r * height + k / width] * frame[k];
+      for (std::size_t c = 0; c < across_pixels; ++c) {
+        float value = 0;
+        for (std::size_t k = 0; k < width; ++k) value += across[c * width + k] * row[k];
+        out[r * across_pixels + c] = value;
+      }
     }
-  }
+  };
 }
 
 Baseline upsampled_frame(const WindowSet& windows, std::span<const std::uint32_t> train) {
   const TaxelArray array = windows.array();
-  const Bicubic upsampling(array.rows, array.columns, windows.scale());
+  const auto upsampling = bicubic_enlargement(array.rows, array.columns, windows.scale());
   // Of the frame that a window shows.
   const auto enlarge = [=, back = windows.delay_frames()](std::span<const float> input,
                                                           std::span<float> out) {

@@ -31,17 +31,11 @@ Baseline mean_image(const WindowSet& windows, std::span<const std::uint32_t> tra
 /// also called Catmull-Rom) along both axes. Taxels lie in the middle of equal cells, which the pixels
 /// divide, so pixel p of a row lies at u = (p + 1/2) / scale - 1/2 in units of taxels. Taxels beyond the edge
 /// repeat the outermost.
-class Bicubic {
- public:
-  Bicubic(int rows, int columns, int scale);
-  /// frame [rows][columns], out [rows * scale][columns * scale]. Throws std::invalid_argument on other
-  /// sizes.
-  void operator()(std::span<const float> frame, std::span<float> out) const;
-
- private:
-  std::size_t rows_, columns_;
-  std::vector<float> down_, across_;  // [pixels][taxels]: weights of the taxels of a line on its pixels
-};
+/// frame [rows][columns], out [rows * scale][columns * scale]; it throws std::invalid_argument on other
+/// sizes.
+std::function<void(std::span<const float> frame, std::span<float> out)> bicubic_enlargement(int rows,
+                                                                                            int columns,
+                                                                                            int scale);
 
 /// "bicubic": a x + b, where x is the bicubic interpolation of the frame that a window shows (the mean of
 /// each taxel's channels), with the line of least squares over all pixels of the training examples, whose

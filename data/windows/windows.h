@@ -15,7 +15,7 @@
 #include "data/recordings/recording.h"
 #include "data/recordings/resample.h"
 #include "data/sensors/taxel_array.h"
-#include "io/files/scratch_file.h"
+#include "io/files/file.h"
 
 namespace supertac {
 

@@ -16,6 +16,12 @@
 namespace supertac {
 namespace {
 
+// digits 10^exponent as the number that is written so: 3 and -1 give 0.3, which 3 * 0.1 is not.
+double decimal(double digits, double exponent) {
+  return exponent < 0 ? digits / std::round(std::pow(10, -exponent))
+                      : digits * std::round(std::pow(10, exponent));
+}
+
 std::string point_text(const Point3& p) {
   return format(p.x, 4) + " " + format(p.y, 4) + " " + format(p.z, 4);
 }

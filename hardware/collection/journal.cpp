@@ -176,13 +176,7 @@ void JournalWriter::write_chunk(JournalStream stream, double time_s, std::span<c
   const std::uint32_t sum = chunk_sum(chunk, payload);
   memcpy(chunk.data() + 12, &sum, sizeof sum);
   chunk.insert(chunk.end(), payload.begin(), payload.end());
-  for (std::size_t done = 0; done < chunk.size();) {
-    const ssize_t count = ::write(descriptor_, chunk.data() + done, chunk.size() - done);
-    if (count < 0 && errno == EINTR) continue;
-    if (count == 0) errno = ENOSPC;
-    if (count <= 0) return failed("cannot be written");
-    done += static_cast<std::size_t>(count);
-  }
+  if (!write_all(descriptor_, chunk)) failed("cannot be written");
 }
 
 void JournalWriter::close() {
@@ -202,13 +196,7 @@ void JournalWriter::close() {
   check();
 }
 
-void JournalWriter::discard() {
-  try {
-    close();
-  } catch (const JournalError&) {  // it goes anyway
-  }
-  (void)::unlink(path_.c_str());
-}
+void JournalWriter::discard() { (void)::unlink(path_.c_str()); }
 
 const std::vector<JournalRecord>& Journal::of(JournalStream stream) const {
   static const std::vector<JournalRecord> kNone;

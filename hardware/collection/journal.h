@@ -53,7 +53,7 @@ class JournalWriter {
   void check();
   /// Writes and syncs everything. Throws JournalError.
   void close();
-  /// Closes and removes the file, for a run in which nothing was recorded.
+  /// Removes the file, for a run in which nothing was recorded: what is written on has no name.
   void discard();
   const std::string& path() const { return path_; }
 

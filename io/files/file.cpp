@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <map>
@@ -132,13 +133,20 @@ bool sync_folder_of(const std::string& path) {
   return synced;
 }
 
+bool write_all(int file, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = retry([&] { return ::write(file, bytes.data(), bytes.size()); });
+    if (count == 0) errno = ENOSPC;
+    if (count <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return true;
+}
+
 bool is_running(std::uint64_t process) {
   const auto id = static_cast<pid_t>(process);
   return static_cast<std::uint64_t>(id) != process || id < 1 || ::kill(id, 0) == 0 || errno != ESRCH;
 }
-
-FileError::FileError(const std::string& path, const std::string& problem)
-    : std::runtime_error(path + ": " + problem), path_(path) {}
 
 FileReader::FileReader(const std::string& path) : path_(path) {
   // O_NONBLOCK: opening a pipe must not wait for a writer.
@@ -231,12 +239,7 @@ AtomicFile::~AtomicFile() {
 
 void AtomicFile::write(std::span<const std::byte> bytes) {
   if (file_ < 0) throw std::invalid_argument("AtomicFile: write after commit (" + path_ + ")");
-  while (!bytes.empty()) {
-    const ssize_t count = retry([&] { return ::write(file_, bytes.data(), bytes.size()); });
-    if (count < 0) fail(path_, "write", errno);
-    if (count == 0) fail(path_, "write", ENOSPC);
-    bytes = bytes.subspan(static_cast<std::size_t>(count));
-  }
+  if (!write_all(file_, bytes)) fail(path_, "write", errno);
 }
 
 void AtomicFile::write(std::string_view text) { write(std::as_bytes(std::span(text))); }
@@ -296,6 +299,44 @@ FolderLock::FolderLock(const std::string& folder) {
     throw FileError(folder, "another program is writing there; wait for its end, or choose another folder");
   held_ = std::move(opened);
   known = held_;
+}
+
+namespace {
+
+[[noreturn]] void no_room(const std::string& folder, const char* what, int error) {
+  throw FileError(folder, std::string("cannot ") + what + " a temporary file there: " + std::strerror(error) +
+                              "; set TMPDIR to a folder on a disk with room");
+}
+
+}  // namespace
+
+ScratchFile::ScratchFile() {
+  const char* chosen = std::getenv("TMPDIR");
+  folder_ = chosen != nullptr && *chosen != '\0' ? chosen : "/var/tmp";
+  std::string name = folder_ + "/.supertac-XXXXXX";
+  file_ = ::mkostemp(name.data(), O_CLOEXEC);
+  if (file_ < 0) no_room(folder_, "make", errno);
+  ::unlink(name.c_str());
+}
+
+ScratchFile::~ScratchFile() { ::close(file_); }
+
+std::uint64_t ScratchFile::append(std::span<const float> numbers) {
+  if (!write_all(file_, std::as_bytes(numbers))) no_room(folder_, "write", errno);
+  const std::uint64_t place = count_;
+  count_ += numbers.size();
+  return place;
+}
+
+void ScratchFile::read(std::uint64_t place, std::span<float> numbers) const {
+  std::uint64_t offset = place * sizeof(float);
+  for (auto bytes = std::as_writable_bytes(numbers); !bytes.empty();) {
+    const ssize_t count =
+        retry([&] { return ::pread(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset)); });
+    if (count <= 0) no_room(folder_, "read", count < 0 ? errno : EIO);
+    offset += static_cast<std::uint64_t>(count);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
 }
 
 }  // namespace supertac

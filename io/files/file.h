@@ -1,4 +1,5 @@
-// Whole files, read with a limit and written atomically, and folders that one program at a time fills.
+// Whole files, read with a limit and written atomically, files without a name for numbers that may be more
+// than memory holds, and folders that one program at a time fills.
 #pragma once
 
 #include <cerrno>
@@ -19,11 +20,8 @@ namespace supertac {
 /// "<path>: <what was wrong, expected, found, what to do>".
 class FileError : public std::runtime_error {
  public:
-  FileError(const std::string& path, const std::string& problem);
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
+  FileError(const std::string& path, const std::string& problem)
+      : std::runtime_error(path + ": " + problem) {}
 };
 
 /// A regular file opened for reading, front to back. Reads are buffered by the caller's span, never mapped:
@@ -36,7 +34,6 @@ class FileReader {
   FileReader(const FileReader&) = delete;
   FileReader& operator=(const FileReader&) = delete;
 
-  const std::string& path() const { return path_; }
   /// Bytes in the file when it was opened.
   std::uint64_t size() const { return size_; }
   /// Fills all of `bytes`. Throws FileError on an I/O error, or when the file ends first.
@@ -129,8 +126,35 @@ class FolderLock {
   std::shared_ptr<const int> held_;
 };
 
+/// A file without a name, in TMPDIR or else in /var/tmp: numbers are appended once and read anywhere, by many
+/// threads at once. The system keeps of it in memory what there is room for, and it is gone with the process,
+/// however that ends: nobody else can read, shorten or forge it. Reads go into the caller's span and are
+/// never mapped, for the reason that FileReader gives.
+class ScratchFile {
+ public:
+  /// Throws FileError when no file can be made there.
+  ScratchFile();
+  ~ScratchFile();
+  ScratchFile(const ScratchFile&) = delete;
+  ScratchFile& operator=(const ScratchFile&) = delete;
+
+  /// Appends the numbers and returns the place of the first. Throws FileError, for example when the disk is
+  /// full.
+  std::uint64_t append(std::span<const float> numbers);
+  /// Fills all of `numbers` with those from `place` on. Throws FileError on an I/O error.
+  void read(std::uint64_t place, std::span<float> numbers) const;
+
+ private:
+  std::string folder_;
+  int file_ = -1;
+  std::uint64_t count_ = 0;
+};
+
 /// fsync of the folder that holds `path`, so that a power cut does not lose a new name. False with errno set.
 bool sync_folder_of(const std::string& path);
+
+/// Writes all bytes to a descriptor. False with errno set.
+bool write_all(int file, std::span<const std::byte> bytes);
 
 /// Calls again as long as a signal interrupts.
 auto retry(const auto& call) {

@@ -1,7 +1,6 @@
 #include "io/numbers/numbers.h"
 
 #include <charconv>
-#include <cmath>
 
 namespace supertac {
 namespace {
@@ -27,16 +26,6 @@ std::string to_text(Arguments... arguments) {
 std::optional<double> parse_double(std::string_view text) { return parse<double>(text); }
 std::optional<std::int64_t> parse_int(std::string_view text) { return parse<std::int64_t>(text); }
 std::optional<std::uint64_t> parse_uint(std::string_view text) { return parse<std::uint64_t>(text); }
-
-std::optional<double> number_of(std::string_view text) {
-  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
-  return parse_double(text);
-}
-
-double decimal(double digits, double exponent) {
-  return exponent < 0 ? digits / std::round(std::pow(10, -exponent))
-                      : digits * std::round(std::pow(10, exponent));
-}
 
 std::string format(double value) { return to_text(value); }
 std::string format(float value) { return to_text(value); }

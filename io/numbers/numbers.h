@@ -12,13 +12,8 @@ namespace supertac {
 /// not, or when the value does not fit. "nan" and "inf" are numbers here; the caller decides whether they may
 /// be.
 std::optional<double> parse_double(std::string_view text);
-/// The same, but one leading '+' is allowed.
-std::optional<double> number_of(std::string_view text);
 std::optional<std::int64_t> parse_int(std::string_view text);
 std::optional<std::uint64_t> parse_uint(std::string_view text);
-
-/// digits 10^exponent as the number that is written so: 3 and -1 give 0.3, which 3 * 0.1 is not.
-double decimal(double digits, double exponent);
 
 /// The shortest text that reads back as the same value.
 std::string format(double value);

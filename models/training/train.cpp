@@ -65,7 +65,7 @@ WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std:
   w.stride = static_cast<int>(recipe.stride);
   const SignalRange range = SignalRange::of_folder(folders.data, recipe.plates, folders.watch(folders.data),
                                                    recipe.range.has_value());
-  range.felt().check();
+  if (const std::string found = range.felt().complaint(); !found.empty()) throw std::runtime_error(found);
   w.scaling = scaling_of(recipe, range, notes);
   WindowSet windows = WindowSet::load(folders.data, recipe.plates, w, folders.watch(folders.data));
   const RandomPasses random{.count = static_cast<std::size_t>(recipe.random_plates),

@@ -38,6 +38,12 @@ void kill_taxel(Recording& recording, std::size_t k) {
 // fit by 0.06 mm, and the simulator tilts each trial by about as much.
 constexpr double kWorstMm = 0.55;
 
+void expect_fit(const Recording& truth, const char* plate) {
+  const Registration r = register_pass(truth, Plate::named(plate));
+  EXPECT_TRUE(r.reliable) << plate << ' ' << r.reason;
+  EXPECT_LT(error_of(r, truth).worst, kWorstMm) << plate;
+}
+
 TEST(Registration, FindsEveryPlateWithoutBias) {
   double bias = 0;
   int n = 0;
@@ -82,10 +88,8 @@ TEST(Registration, AFastPassWithALongEndIsNotAPitchOff) {
 TEST(Registration, LateStartsAndEarlyEndsDoNotMoveIt) {
   for (const double late : {0.5, 1.7, 2.6})
     for (const double early : {0.0, 1.5}) {
-      const Recording truth = like_the_rig("6_Bumps", 4, 3, late, early);
-      const Registration r = register_pass(truth, Plate::named("6_Bumps"));
-      EXPECT_TRUE(r.reliable) << late << ' ' << early << ' ' << r.reason;
-      EXPECT_LT(error_of(r, truth).worst, kWorstMm) << late << ' ' << early;
+      SCOPED_TRACE(late + early);
+      expect_fit(like_the_rig("6_Bumps", 4, 3, late, early), "6_Bumps");
     }
 }
 
@@ -96,9 +100,7 @@ TEST(Registration, ACountedClockMayBeSlowByWhatWasLostAndHalfSpeed) {
   truth.metadata["time_base"] = "nominal";
   EXPECT_FALSE(register_pass(truth, Plate::named("6_Ridges")).reliable) << "no frame was seen to be lost";
   truth.metadata["lost_frames"] = std::to_string(truth.frames() / 20);
-  const Registration r = register_pass(truth, Plate::named("6_Ridges"));
-  EXPECT_TRUE(r.reliable) << r.reason;
-  EXPECT_LT(error_of(r, truth).worst, kWorstMm);
+  expect_fit(truth, "6_Ridges");
   const Recording slow = like_the_rig("3_Bumps", 5, 4, 0, 0, 5);
   EXPECT_LT(error_of(register_pass(slow, Plate::named("3_Bumps")), slow).worst, kWorstMm);
 }
@@ -106,14 +108,10 @@ TEST(Registration, ACountedClockMayBeSlowByWhatWasLostAndHalfSpeed) {
 TEST(Registration, SurvivesSaturationAndDeadTaxels) {
   Recording truth = like_the_rig("4_Ridges", 4, 5);
   press_hard(truth, 8);
-  const Registration hard = register_pass(truth, Plate::named("4_Ridges"));
-  EXPECT_TRUE(hard.reliable) << hard.reason;
-  EXPECT_LT(error_of(hard, truth).worst, kWorstMm);
+  expect_fit(truth, "4_Ridges");
   truth = like_the_rig("4_Ridges", 4, 5);
   for (const std::size_t k : {0, 1, 2, 5, 6, 8, 12, 14}) kill_taxel(truth, k);
-  const Registration half = register_pass(truth, Plate::named("4_Ridges"));
-  EXPECT_TRUE(half.reliable) << half.reason;
-  EXPECT_LT(error_of(half, truth).worst, kWorstMm);
+  expect_fit(truth, "4_Ridges");
 }
 
 TEST(Registration, ABurstOfLostFramesCutsThePass) {

@@ -42,7 +42,7 @@ double mean_error(const WindowSet& set, const std::vector<std::uint32_t>& indice
 
 std::vector<float> upsampled(const std::vector<float>& frame) {
   std::vector<float> out(256);
-  Bicubic(4, 4, 4)(frame, out);
+  bicubic_enlargement(4, 4, 4)(frame, out);
   return out;
 }
 
@@ -82,7 +82,7 @@ TEST(Bicubic, HasKeysWeights) {
 TEST(Bicubic, TakesArraysOfAnyShape) {
   const std::vector<float> frame = {1, 2, 3, 4, 5, 6};  // 2 rows of 3
   std::vector<float> bicubic(24);
-  Bicubic(2, 3, 2)(frame, bicubic);
+  bicubic_enlargement(2, 3, 2)(frame, bicubic);
   for (std::size_t r = 0; r < 4; ++r)
     for (std::size_t c = 0; c < 6; ++c)
       EXPECT_NEAR(bicubic[r * 6 + c], frame[(r / 2) * 3 + c / 2], 1.2) << r << " " << c;
@@ -165,7 +165,7 @@ TEST(Baselines, NeedWindowsToFitToAndTheirSizes) {
                    baseline.predict(set.raw_window(0), small));
   }
   EXPECT_REFUSAL("baseline: a frame expects 16 values, got 15",
-                 Bicubic(4, 4, 4)(std::vector<float>(15), out));
+                 bicubic_enlargement(4, 4, 4)(std::vector<float>(15), out));
 }
 
 WindowSet make_ridge_set(double noise, int passes = 5) { return surface_windows(0.3, 0.4, noise, passes); }

@@ -31,10 +31,27 @@ std::set<std::size_t> passes_of(const WindowSet& set, const std::vector<std::uin
   return passes;
 }
 
-std::set<std::string> plates_of(const WindowSet& set, const std::vector<std::uint32_t>& side) {
-  std::set<std::string> plates;
-  for (const std::size_t p : passes_of(set, side)) plates.insert(set.passes()[p].plate);
-  return plates;
+/// Of the passes of a side.
+std::set<std::string> plates_of(const WindowSet& set, const std::vector<std::uint32_t>& side,
+                                std::string WindowSet::Pass::*name = &WindowSet::Pass::plate) {
+  std::set<std::string> names;
+  for (const std::size_t p : passes_of(set, side)) names.insert(set.passes()[p].*name);
+  return names;
+}
+
+std::set<std::string> groups_of(const WindowSet& set, const std::vector<std::uint32_t>& side) {
+  return plates_of(set, side, &WindowSet::Pass::group);
+}
+
+/// Passes of 30 frames, whose groups take turns.
+WindowSet set_of_people(int passes, int people) {
+  WindowSet set(wide_settings(16));
+  for (int pass = 1; pass <= passes; ++pass) {
+    Recording recording = make_recording({.pass = pass, .frames = 30});
+    recording.metadata["group"] = "person " + std::to_string(pass % people);
+    set.add(recording);
+  }
+  return set;
 }
 
 bool disjoint(const Split& split) {
@@ -214,44 +231,29 @@ TEST(Split, TrialTestsAllTrialsButTheFirst) {
 }
 
 TEST(Split, WhatIsForTrainingOnlyIsNoGroupToHoldOut) {
-  WindowSet set(wide_settings(16));
-  for (int pass = 1; pass <= 3; ++pass) {
-    Recording recording = make_recording({.pass = pass, .frames = 30});
-    recording.metadata["group"] = "person " + std::to_string(pass);
-    set.add(recording);
-  }
+  WindowSet set = set_of_people(3, 3);
   set.add(make_recording({.pass = 4, .frames = 30}), ".", {.training_only = true});
   Split split = make_split(set, SplitKind::group, 3);
   EXPECT_TRUE(hold_out_group(set, split, 3).empty()) << "two groups are left to train on";
 }
 
 TEST(Split, GroupKeepsGroupsTogether) {
-  WindowSet set(wide_settings(16));
-  for (int pass = 1; pass <= 20; ++pass) {
-    Recording recording = make_recording({.pass = pass, .frames = 30});
-    recording.metadata["group"] = "person " + std::to_string(pass % 5);
-    set.add(recording);
-  }
+  WindowSet set = set_of_people(20, 5);
   const Split split = make_split(set, SplitKind::group, 3);
-  std::set<std::string> train, test;
-  for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].group);
-  for (const std::size_t p : passes_of(set, split.test)) test.insert(set.passes()[p].group);
+  const auto train = groups_of(set, split.train), test = groups_of(set, split.test);
   EXPECT_EQ(train.size(), 4U);
   EXPECT_EQ(test.size(), 1U);
   EXPECT_FALSE(train.contains(*test.begin()));
   Split left = split;
   const std::vector<std::uint32_t> held_out = hold_out_group(set, left, 3);
-  std::set<std::string> kept, taken;
-  for (const std::size_t p : passes_of(set, left.train)) kept.insert(set.passes()[p].group);
-  for (const std::size_t p : passes_of(set, held_out)) taken.insert(set.passes()[p].group);
+  const auto kept = groups_of(set, left.train), taken = groups_of(set, held_out);
   EXPECT_EQ(kept.size(), 3U);
   EXPECT_EQ(taken.size(), 1U);
   EXPECT_FALSE(kept.contains(*taken.begin()));
   EXPECT_EQ(left.train.size() + held_out.size(), split.train.size());
   EXPECT_EQ(left.test, split.test);
   const Split named = make_split(set, SplitKind::group, 3, {"person 2", "person 4"});
-  for (const std::size_t p : passes_of(set, named.test))
-    EXPECT_TRUE(set.passes()[p].group == "person 2" || set.passes()[p].group == "person 4");
+  EXPECT_EQ(groups_of(set, named.test), (std::set<std::string>{"person 2", "person 4"}));
   EXPECT_EQ(named.test.size() + named.train.size(), set.size());
   EXPECT_REFUSAL(
       "split group: the data has no group 'person 9' to leave out; it has person 0, person 1, person 2, "

@@ -7,7 +7,6 @@
 
 #include <fstream>
 
-#include "io/files/scratch_file.h"
 #include "tests/io/faults.h"
 #include "tests/support/test.h"
 

@@ -17,18 +17,19 @@ struct PairFile {
     for (std::size_t i = 0; i < input.size(); ++i) input[i] = static_cast<float>(i);
     for (std::size_t i = 0; i < target.size(); ++i) target[i] = static_cast<float>(i % 101) / 100;
   }
-  std::string write(const TemporaryFolder& folder) const {
+  std::vector<Recording> import(const std::optional<Sensor>& sensor = {}) const {
+    const TemporaryFolder folder;
     std::vector<TensorToWrite> tensors = {{"input", dtype, input_shape, std::as_bytes(std::span(input))},
                                           {"target", "F32", target_shape, std::as_bytes(std::span(target))}};
     if (with_group) tensors.push_back({"group", "I64", {group.size()}, std::as_bytes(std::span(group))});
     write_safetensors(folder / "pairs.safetensors", {}, tensors);
-    return folder / "pairs.safetensors";
+    return import_pairs(SafetensorsFile::read(folder / "pairs.safetensors"), sensor);
   }
 };
 
 TEST(PairImport, ARecordingForEachGroupWithChannelsLastAndItsTruth) {
   const TemporaryFolder folder;
-  const std::vector<Recording> recordings = import_pairs(SafetensorsFile::read(PairFile().write(folder)));
+  const std::vector<Recording> recordings = PairFile().import();
   ASSERT_EQ(recordings.size(), 5u);
   std::vector<std::string> names;
   for (const Recording& r : recordings) names.push_back(r.plate);
@@ -49,24 +50,19 @@ TEST(PairImport, ARecordingForEachGroupWithChannelsLastAndItsTruth) {
 }
 
 TEST(PairImport, RefusesSharesUnderASensorOfCounts) {
-  const TemporaryFolder folder;
   PairFile pairs;
   for (float& value : pairs.input) value /= 299;
-  const auto import_with = [&](double span) {
-    const Sensor sensor{.array = {3, 5, 2.5, 2}, .scale = {.unit = "counts", .rest = 40, .span = -span}};
-    return import_pairs(SafetensorsFile::read(pairs.write(folder)), sensor);
-  };
+  const Sensor sensor{.array = {3, 5, 2.5, 2}, .scale = {.unit = "counts", .rest = 40, .span = -860}};
   EXPECT_ERROR(
-      (void)import_with(860), FileError,
+      (void)pairs.import(sensor), FileError,
       "input runs from 0 to 1, the sensor's range is 40 to 900 counts; save it in the sensor's unit, "
       "or mend the sensor's file");
   for (float& value : pairs.input) value = 40 + 860 * value;
-  EXPECT_EQ(import_with(860).size(), 5U);
+  EXPECT_EQ(pairs.import(sensor).size(), 5U);
 }
 
 // Targets of other frames than the inputs: of 400 pairs each shows what the input felt 12 pairs before.
 TEST(PairImport, RefusesTargetsThatComeLate) {
-  const TemporaryFolder folder;
   for (const int late : {0, 12}) {
     PairFile file;
     file.with_group = false;
@@ -83,45 +79,41 @@ TEST(PairImport, RefusesTargetsThatComeLate) {
       file.input.insert(file.input.end(), 4, load(i));
       file.target.insert(file.target.end(), 16, load(i - late));
     }
-    const SafetensorsFile read = SafetensorsFile::read(file.write(folder));
     if (late == 0) {
-      EXPECT_EQ(import_pairs(read).size(), 1u);
+      EXPECT_EQ(file.import().size(), 1u);
       continue;
     }
-    const std::string what = what_of<FileError>([&] { import_pairs(read); });
+    const std::string what = what_of<FileError>([&] { file.import(); });
     EXPECT_NE(what.find("target shows touches 12.0 +- "), std::string::npos) << what;
     EXPECT_NE(what.find(" frames later than input; pair each input"), std::string::npos) << what;
   }
 }
 
 TEST(PairImport, GroupsStayTogetherInASplit) {
-  const TemporaryFolder folder;
   PairFile file;
   WindowSet frames({.timesteps = 1});
-  for (const Recording& r : import_pairs(SafetensorsFile::read(file.write(folder)))) frames.add(r);
+  for (const Recording& r : file.import()) frames.add(r);
   const Split split = make_split(frames, SplitKind::group, 1);
   EXPECT_EQ(split.train.size() + split.test.size(), 10u);
   for (const std::uint32_t a : split.test)
     for (const std::uint32_t b : split.train) EXPECT_NE(frames.pass_of(a), frames.pass_of(b));
   file.with_group = false;
-  const std::vector<Recording> loose = import_pairs(SafetensorsFile::read(file.write(folder)));
+  const std::vector<Recording> loose = file.import();
   ASSERT_EQ(loose.size(), 1u);
   EXPECT_EQ(loose.front().plate, "pairs");
   EXPECT_FALSE(loose.front().metadata.contains("group"));
 }
 
 TEST(PairImport, ASensorSaysWhatTheNumbersMean) {
-  const TemporaryFolder folder;
   Sensor sensor{.array = {3, 5, 2.5, 2}, .scale = {.unit = "mV", .rest = 300, .span = 250}};
-  const Recording first = import_pairs(SafetensorsFile::read(PairFile().write(folder)), sensor).front();
+  const Recording first = PairFile().import(sensor).front();
   EXPECT_EQ(first.signal_scale, sensor.scale);
   EXPECT_EQ(first.array, sensor.array);
   sensor.array.rows = 4;
-  EXPECT_EQ(what_of<FileError>(
-                [&] { (void)import_pairs(SafetensorsFile::read(folder / "pairs.safetensors"), sensor); }),
-            folder / "pairs.safetensors" +
-                ": holds frames of 3x5 taxels at 2.5 mm with 2 channels, expected those of the sensor, 4x5 "
-                "taxels at 2.5 mm with 2 channels");
+  EXPECT_ERROR(
+      PairFile().import(sensor), FileError,
+      "pairs.safetensors: holds frames of 3x5 taxels at 2.5 mm with 2 channels, expected those of the "
+      "sensor, 4x5 taxels at 2.5 mm with 2 channels");
 }
 
 TEST(PairImport, RefusesWhatDoesNotFitTogether) {
@@ -146,12 +138,12 @@ TEST(PairImport, RefusesWhatDoesNotFitTogether) {
        },
        "expected 1 to 8 channels"},
       {[](PairFile& f) { f.group.resize(3); }, "tensor 'group' is I64 [3], expected I64 [10]"}};
-  const TemporaryFolder folder;
   for (const auto& [spoil, expected] : cases) {
     PairFile file;
     spoil(file);
-    EXPECT_ERROR(import_pairs(SafetensorsFile::read(file.write(folder))), FileError, expected);
+    EXPECT_ERROR(file.import(), FileError, expected);
   }
+  const TemporaryFolder folder;
   const std::vector<float> input(10 * 2 * 3 * 5);
   write_safetensors(folder / "a", {}, {{"input", "F32", {10, 2, 3, 5}, std::as_bytes(std::span(input))}});
   EXPECT_EQ(
