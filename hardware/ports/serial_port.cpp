@@ -70,11 +70,6 @@ int set_raw_terminal(int descriptor, unsigned baud) {
   return ioctl(descriptor, TCSETS2, &settings) == 0 ? 0 : errno;
 }
 
-unsigned terminal_baud(int descriptor) {
-  termios2 settings{};
-  return ioctl(descriptor, TCGETS2, &settings) == 0 ? settings.c_ospeed : 0;
-}
-
 double monotonic_seconds() { return seconds_of(CLOCK_MONOTONIC); }
 
 SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
@@ -110,7 +105,10 @@ SerialPort::~SerialPort() {
   close(descriptor_);
 }
 
-unsigned SerialPort::baud() const { return terminal_baud(descriptor_); }
+unsigned SerialPort::baud() const {
+  termios2 settings{};
+  return ioctl(descriptor_, TCGETS2, &settings) == 0 ? settings.c_ospeed : 0;
+}
 
 Received SerialPort::read(std::span<std::byte> buffer, double until) {
   for (;;) {

@@ -58,9 +58,6 @@ constexpr unsigned kLeastBaud = 50, kMostBaud = 100'000'000;
 /// Returns 0 or the errno of the call that failed.
 int set_raw_terminal(int descriptor, unsigned baud);
 
-/// Baud rate as the terminal reports it, 0 when it does not.
-unsigned terminal_baud(int descriptor);
-
 struct PortInfo {
   std::string path;     ///< /dev/ttyACM0
   std::string usb_id;   ///< "0483:5740", empty when not USB
