@@ -177,7 +177,6 @@ int run(Arguments& arguments) {
   if (arguments.given("sensor")) sensor = read_sensor(arguments.text("sensor"));
   if (arguments.given("fit")) sensor = fitted(arguments, sensor);
   const auto settings = read_settings(arguments, sensor);
-  const std::uint64_t seed = arguments.seed();
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
   OutputFolder folder(arguments.output("out"));
   const bool presses = arguments.given("presses");
@@ -196,7 +195,7 @@ int run(Arguments& arguments) {
   arguments.write_json({{"folder", arguments.text("out")},
                         {"recordings", jobs.size()},
                         {"frames", frames},
-                        {"seed", seed},
+                        {"seed", arguments.seed()},
                         {"command", arguments.command_line()}});
   arguments.print(std::to_string(jobs.size()) + " recordings, " + std::to_string(frames) + " frames in " +
                   arguments.text("out"));

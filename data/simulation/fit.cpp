@@ -238,10 +238,9 @@ BodyFit BodyFitter::operator()(const Recording& touches) const {
         "too little was pressed: expected 100 frames or more in which a taxel shows 8 % of the range; press "
         "here and "
         "there for half a minute, or let the probe find the range");
-  fit.unlike = regression_->unlike(found);
-  if (fit.unlike > kMostUnlike)
+  if (const double unlike = regression_->unlike(found); unlike > kMostUnlike)
     throw std::runtime_error(
-        "these touches are like none that were simulated (" + format(fit.unlike, 3) +
+        "these touches are like none that were simulated (" + format(unlike, 3) +
         " standard deviations off, at most " + format(kMostUnlike) +
         "): look at the sensor's range, order and pitch first (supertac-stream --web), or leave "
         "the fit out");

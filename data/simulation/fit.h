@@ -26,7 +26,6 @@ struct FittedNumber {
 struct BodyFit {
   Sensor sensor;
   std::vector<FittedNumber> numbers;
-  double unlike = 0;  ///< how far the touches are from any simulated ones, in standard deviations of these
   /// Lines for people: each number with its deviation, and what could not be told and why.
   std::vector<std::string> lines() const;
 };
@@ -46,8 +45,8 @@ class BodyFitter {
   /// deviation, so that simulations vary it as arrays differ. What the sensor's file states without an
   /// uncertainty is known and stays. Noise and rests are measured, the rests from those that the recording
   /// was made with (metadata "rest"). Gains cannot be told from single touches (supertac-stream --probe
-  /// --gain). Throws std::runtime_error when there is too little touch, or one that no simulated body shows
-  /// (unlike > 8).
+  /// --gain). Throws std::runtime_error when there is too little touch, or one that no simulated body shows:
+  /// a statistic more than 8 standard deviations off.
   BodyFit operator()(const Recording& touches) const;
 
  private:

@@ -102,13 +102,12 @@ std::uint8_t level_of(float value) {
   return static_cast<std::uint8_t>(std::lround(std::min(value, 1.0F) * (kMapSize - 1)));
 }
 
-Picture::Picture(int w, int h, Rgb background) : width(w), height(h) {
+Picture::Picture(int w, int h) : width(w), height(h) {
   constexpr int kMax = 65535;
   if (w < 1 || h < 1 || w > kMax || h > kMax)
     throw std::invalid_argument("picture: sides must be 1 to 65535 pixels, got " + std::to_string(w) + " x " +
                                 std::to_string(h) + "; draw fewer windows or smaller panels");
-  rgb.resize(static_cast<std::size_t>(w) * static_cast<std::size_t>(h) * 3);
-  for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] = background[i % 3];
+  rgb.assign(static_cast<std::size_t>(w) * static_cast<std::size_t>(h) * 3, 255);
 }
 
 Rgb Picture::at(int x, int y) const {

@@ -24,8 +24,8 @@ struct Picture {
   int width = 0, height = 0;
   std::vector<std::uint8_t> rgb;
 
-  /// A picture of one colour. Throws std::invalid_argument unless both sides are 1..65535.
-  Picture(int width, int height, Rgb background = {255, 255, 255});
+  /// A white picture. Throws std::invalid_argument unless both sides are 1..65535.
+  Picture(int width, int height);
   /// (x, y) must lie in the picture; past its last pixel both throw std::out_of_range.
   Rgb at(int x, int y) const;
   void set(int x, int y, Rgb colour);

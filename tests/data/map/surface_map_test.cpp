@@ -69,25 +69,21 @@ TEST(SurfaceMap, WeighsByWayAndError) {
   EXPECT_NEAR(value_at(frames, 10, 20), (0.001 * 0.1 + 1.001 * 0.5 + 1.001 * 0.9) / 2.003, 1e-6);
 }
 
-TEST(SurfaceMap, AFingerThatStandsCountsOnce) {
-  SurfaceMap map(kGrid, false);
+TEST(SurfaceMap, AFingerThatStandsCountsOnceAndTouchesOfOnePlaceCountAlike) {
   const std::vector<float> low(kGrid.pixels(), 0.2F), high(kGrid.pixels(), 0.8F);
-  map.add(0, 0, low, {});
-  map.add(0, 0.75, low, {});
-  for (int k = 0; k < 100; ++k) map.add(0, 0.75, high, {});
-  map.add(0, 1.5, high, {});
-  EXPECT_NEAR(value_at(map, 0, 0), 0.5, 0.06);
-}
-
-TEST(SurfaceMap, TouchesOfOnePlaceCountAlike) {
-  SurfaceMap map(kGrid);
-  const std::vector<float> low(kGrid.pixels(), 0.2F), high(kGrid.pixels(), 0.8F);
-  for (int k = 0; k < 5; ++k) map.add(0, 0, low, {});
-  for (int k = 0; k < 5; ++k) map.add(50, 0, low, {});  // elsewhere meanwhile
-  for (int k = 0; k < 5; ++k) map.add(0, 0, high, {});
-  EXPECT_NEAR(value_at(map, 0, 0), 0.5, 1e-6);
-  EXPECT_TRUE(std::isnan(value_at(map, 50, 0)));
-  EXPECT_NEAR(value_at(map, 100, 0), 0.2, 1e-6);
+  SurfaceMap stood(kGrid, false), touched(kGrid);
+  const auto add = [](SurfaceMap& map, int times, double x_mm, double y_mm,
+                      const std::vector<float>& picture) {
+    for (int k = 0; k < times; ++k) map.add(x_mm, y_mm, picture, {});
+  };
+  add(stood, 1, 0, 0, low), add(stood, 1, 0, 0.75, low);
+  add(stood, 100, 0, 0.75, high), add(stood, 1, 0, 1.5, high);
+  EXPECT_NEAR(value_at(stood, 0, 0), 0.5, 0.06);
+  add(touched, 5, 0, 0, low), add(touched, 5, 50, 0, low),
+      add(touched, 5, 0, 0, high);  // elsewhere meanwhile
+  EXPECT_NEAR(value_at(touched, 0, 0), 0.5, 1e-6);
+  EXPECT_TRUE(std::isnan(value_at(touched, 50, 0)));
+  EXPECT_NEAR(value_at(touched, 100, 0), 0.2, 1e-6);
 }
 
 // A slide whose pictures are wrong while a point is new: the map is nearer to the truth than their mean.

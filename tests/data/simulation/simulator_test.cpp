@@ -161,18 +161,16 @@ TEST(Simulator, AFingerThatWandersRocksAsMuchAsSaid) {
       const Recording r = simulate_pass(plate, {.pass = 4, .from_mm = 20, .to_mm = 100}, settings, seed);
       for (std::size_t i = 0; i < r.frames(); i += 3) {
         if (r.lift_mm[i] > 0) continue;
-        double mean = 0, lines[4] = {};
+        double mean = 0, rise_along = 0, rise_across = 0;
         for (std::size_t k = 0; k < rig::kTaxels; ++k) {
           const double load =
               (rig::kRestVolts - r.signals[i * rig::kTaxels + k]) / settings.volts_per_load / 0.5;
           mean += load / rig::kTaxels;
-          if (k / 4 == 0) lines[0] += load / 4;
-          if (k / 4 == 3) lines[1] += load / 4;
-          if (k % 4 == 0) lines[2] += load / 4;
-          if (k % 4 == 3) lines[3] += load / 4;
+          rise_along += load / 4 * ((k / 4 == 3) - (k / 4 == 0));
+          rise_across += load / 4 * ((k % 4 == 3) - (k % 4 == 0));
         }
         height += std::pow(mean - settings.indentation_mm, 2), ++n;
-        along += std::pow(lines[1] - lines[0], 2), across += std::pow(lines[3] - lines[2], 2);
+        along += std::pow(rise_along, 2), across += std::pow(rise_across, 2);
       }
     }
     return std::vector<double>{std::sqrt(height / n), std::sqrt(along / n), std::sqrt(across / n)};

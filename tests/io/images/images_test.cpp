@@ -138,7 +138,8 @@ TEST(Text, OutsideIsCutAndForeignLettersAreQuestionMarks) {
 
 TEST(Captions, StandAroundThePictureWithAColourBar) {
   const Rgb red = {255, 0, 0};
-  const Picture inside(60, 40, red);
+  Picture inside(60, 40);
+  for (std::size_t i = 0; i < inside.rgb.size(); ++i) inside.rgb[i] = red[i % 3];
   const Picture whole = captioned(
       inside, {.title = "title", .columns = {{30, "felt"}}, .rows = {{20, "a\nb"}}, .low = "0", .high = "1"});
   int reds = 0;
