@@ -132,7 +132,6 @@ MarlinLink::Exchange MarlinLink::exchange_of(std::string_view code, double deadl
                           " last); check the printer and start again");
     }
     if (answered) continue;
-    ++counters_.timeouts;
     exchange.once ? give_back(exchange) : ask(exchange);
   }
   owed_ = 0;
@@ -163,7 +162,7 @@ void MarlinLink::count_copy(Exchange& exchange, const std::string& why) {
   }
   exchange.answer.repeated = true;
   exchange.fault = exchange.asked = false;
-  ++counters_.repeats;
+  ++repeats_;
   forget();
 }
 
@@ -197,7 +196,6 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
       exchange.until = std::max(exchange.until, arrival_s_ + kBusyDeadline);
       break;
     case ReplyKind::line_fault:
-      ++counters_.faults;
       exchange.fault = true;
       if (reply.number) on_last_line(exchange, *reply.number);
       break;
@@ -233,7 +231,6 @@ void MarlinLink::on_unknown_command(Exchange& exchange, const Reply& reply) {
     exchange.error = reply.text;
     return;
   }
-  ++counters_.faults;
   exchange.fault = true;
 }
 

@@ -85,12 +85,6 @@ struct MarlinCapabilities {
 /// thread. Times are seconds of the port's clock.
 class MarlinLink {
  public:
-  /// Of the whole connection.
-  struct Counters {
-    std::uint64_t repeats = 0;   ///< lines sent again
-    std::uint64_t timeouts = 0;  ///< answers that did not come in time
-    std::uint64_t faults = 0;    ///< damaged lines reported by the firmware
-  };
   /// What the firmware said to one command, and when.
   struct Answer {
     std::vector<Reply> replies;  ///< the lines before its ok, oldest first
@@ -143,7 +137,8 @@ class MarlinLink {
   void set_watch(std::function<void()> watch) { watch_ = std::move(watch); }
 
   const MarlinCapabilities& capabilities() const { return capabilities_; }
-  const Counters& counters() const { return counters_; }
+  /// Lines sent again, of the whole connection.
+  std::uint64_t repeats() const { return repeats_; }
   bool halted() const { return halted_; }
   /// Connected, and neither halted nor restarted since.
   bool in_use() const { return connected_ && !halted_; }
@@ -188,7 +183,7 @@ class MarlinLink {
   double arrival_s_ = 0;                 // of the last byte received
   std::size_t bytes_ = 0, no_text_ = 0;  // received so far; those that stand in no text (is_text())
   MarlinCapabilities capabilities_;
-  Counters counters_;
+  std::uint64_t repeats_ = 0;
   std::string complaint_;         // what was said since an ok; the cause of a halt stands before it
   std::deque<std::string> kept_;  // lines number_ - kept_.size() + 1 ... number_
   std::int64_t number_ = 0;       // of the newest line

@@ -41,7 +41,7 @@ TEST(Printer, ArrivesWhereItWasSent) {
     bench.printer.start_move({120, 110, 131.81}, 20);
     bench.printer.finish_move();
     EXPECT_LT(distance(bench.head(), {120, 110, 131.81}), 1e-6);
-    EXPECT_EQ(bench.printer.link().counters().repeats, 0U);
+    EXPECT_EQ(bench.printer.link().repeats(), 0U);
     EXPECT_TRUE(bench.printer.quick_stop().confirmed);
   }
 }
@@ -118,7 +118,7 @@ TEST(Printer, QuickStopActsAheadOfTheQueue) {
     const Printer::Stop stop = bench.printer.quick_stop();
     EXPECT_TRUE(stop.confirmed) << stop.text;
     EXPECT_EQ(stop.text.find("no emergency parser") != std::string::npos, !parser) << stop.text;
-    EXPECT_EQ(bench.printer.link().counters().timeouts, 0U);
+    EXPECT_EQ(bench.printer.link().repeats(), 0U);
     EXPECT_LT(bench.rig.now() - stop_at, 3);
     EXPECT_LT(bench.head().y, 125);
     EXPECT_LT(distance(bench.printer.target(), bench.head()), 0.01);
@@ -213,7 +213,7 @@ TEST(Klipper, WhatItRefusesIsSentOnceAndSaid) {
   EXPECT_ERROR(marlin.printer.link().command("M999"), PrinterRefused, "echo:Unknown command: \"M0999\"");
   EXPECT_ERROR(bench.printer.link().command("G1 X10"), PrinterRefused, "!! Must home axis first");
   EXPECT_ERROR(bench.printer.link().command("M410"), PrinterRefused, "// Unknown command:\"M410\"");
-  for (PrinterBench* printer : {&marlin, &bench}) EXPECT_EQ(printer->printer.link().counters().repeats, 0U);
+  for (PrinterBench* printer : {&marlin, &bench}) EXPECT_EQ(printer->printer.link().repeats(), 0U);
   EXPECT_TRUE(bench.printer.emergency_stop().confirmed);
 }
 
