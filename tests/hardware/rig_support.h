@@ -8,6 +8,7 @@
 #include <array>
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -169,6 +170,15 @@ struct CollectionBench {
 struct ReadyBench : PrinterBench {
   explicit ReadyBench(const RigSettings& settings = running_rig()) : PrinterBench(settings) {
     printer.confirm_origin(rig::kMounted);
+  }
+  /// A run of the plan; `plant` is done once, when the head is in the slide of pass 1.
+  PalpationOutcome run(const PalpationPlan& plan, const std::function<void()>& plant) {
+    bool done = false;
+    PalpationObserver observer;
+    observer.position = [&](const Leg& leg, const PositionSample& sample) {
+      if (leg.phase == Phase::slide && sample.position.y >= 120 && !std::exchange(done, true)) plant();
+    };
+    return run_palpation(printer, plan, observer);
   }
 };
 

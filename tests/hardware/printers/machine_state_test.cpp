@@ -148,15 +148,10 @@ TEST(MachineState, TheCauseOfAShutdownIsQuoted) {
 
 /// A collection into whose slide something is said, or happens, once.
 struct Interrupted {
-  explicit Interrupted(const VirtualPrinterSettings& firmware, std::function<void(PrinterBench&)> plant)
+  explicit Interrupted(const VirtualPrinterSettings& firmware,
+                       const std::function<void(PrinterBench&)>& plant)
       : bench(running_rig(firmware)) {
-    PalpationObserver observer;
-    observer.position = [this, plant = std::move(plant)](const Leg& leg, const PositionSample& sample) {
-      if (leg.phase != Phase::slide || sample.position.y < 120 || planted_s > 0) return;
-      planted_s = bench.rig.now();
-      plant(bench);
-    };
-    outcome = run_palpation(bench.printer, {.passes = 2}, observer);
+    outcome = bench.run({.passes = 2}, [&] { planted_s = bench.rig.now(), plant(bench); });
   }
   ReadyBench bench;
   double planted_s = 0;

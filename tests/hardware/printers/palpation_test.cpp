@@ -10,30 +10,12 @@ namespace supertac::palpation_test {
 
 using rig::kMounted;
 
-struct PalpationBench : ReadyBench {
-  using ReadyBench::ReadyBench;
-  PalpationOutcome run(const PalpationPlan& plan, const PalpationObserver& observer = {}) {
-    return run_palpation(printer, plan, observer);
-  }
-  /// Does `plant` once, when the head is in the slide of pass 1.
-  PalpationObserver in_slide(std::function<void()> plant) {
-    PalpationObserver observer;
-    auto done = std::make_shared<bool>(false);
-    observer.position = [=](const Leg& leg, const PositionSample& sample) {
-      if (leg.phase != Phase::slide || sample.position.y < 120 || *done) return;
-      *done = true;
-      plant();
-    };
-    return observer;
-  }
-};
-
 TEST(Palpation, EightPassesLiftBeforeTheyShift) {
-  PalpationBench bench;
+  ReadyBench bench;
   std::vector<std::string> phases;
   PalpationObserver observer;
   observer.leg_ended = [&](const Leg& leg) { phases.emplace_back(name_of(leg.phase)); };
-  const PalpationOutcome outcome = bench.run({.passes = 2}, observer);
+  const PalpationOutcome outcome = run_palpation(bench.printer, {.passes = 2}, observer);
   EXPECT_TRUE(outcome.complete);
   EXPECT_EQ(outcome.passes_done, 2);
   EXPECT_EQ(phases, (std::vector<std::string>{"approach", "onset", "slide", "release", "reposition", "onset",
@@ -51,11 +33,13 @@ TEST(Palpation, TheTimeLeftIsThatOfTheLegsToCome) {
 }
 
 TEST(Palpation, TheWholeWayIsCheckedBeforeTheFirstMove) {
-  PalpationBench bench;
-  EXPECT_ERROR(bench.run({.passes = 40}), OutsideLimits,
+  ReadyBench bench;
+  EXPECT_ERROR(run_palpation(bench.printer, {.passes = 40}), OutsideLimits,
                "beside the plate; nothing was sent, lift first");  // only the last passes leave the plate
-  EXPECT_ERROR(bench.run({.passes = 0}), std::invalid_argument, "expected 1 to 1000 passes");
-  EXPECT_ERROR(bench.run({.speed = INFINITY}), std::invalid_argument, "slide, lift and speed above 0");
+  EXPECT_ERROR(run_palpation(bench.printer, {.passes = 0}), std::invalid_argument,
+               "expected 1 to 1000 passes");
+  EXPECT_ERROR(run_palpation(bench.printer, {.speed = INFINITY}), std::invalid_argument,
+               "slide, lift and speed above 0");
   EXPECT_TRUE(moves_of(bench.firmware()).empty());
 }
 
@@ -68,8 +52,8 @@ TEST(Palpation, AFaultInContactLiftsTheFingerWhateverIsThrown) {
       [] { throw 42; },
       [] { throw PortUnplugged("port simulated printer2: the device is gone"); }};
   for (const auto& thrower : throwers) {
-    PalpationBench bench;
-    const PalpationOutcome outcome = bench.run({.passes = 2}, bench.in_slide(thrower));
+    ReadyBench bench;
+    const PalpationOutcome outcome = bench.run({.passes = 2}, thrower);
     EXPECT_FALSE(outcome.complete);
     EXPECT_EQ(outcome.finger, PalpationOutcome::Finger::lifted) << outcome.note;
     EXPECT_TRUE(outcome.error);
@@ -79,9 +63,8 @@ TEST(Palpation, AFaultInContactLiftsTheFingerWhateverIsThrown) {
 }
 
 TEST(Palpation, AResetInTheSlideEndsTheRunAtOnce) {
-  PalpationBench bench;
-  const PalpationOutcome outcome =
-      bench.run({.passes = 2}, bench.in_slide([&] { bench.firmware().reset(bench.rig.now()); }));
+  ReadyBench bench;
+  const PalpationOutcome outcome = bench.run({.passes = 2}, [&] { bench.firmware().reset(bench.rig.now()); });
   EXPECT_FALSE(outcome.complete);
   EXPECT_EQ(outcome.finger, PalpationOutcome::Finger::stopped);
   EXPECT_THROW(std::rethrow_exception(outcome.error), PrinterReset);
@@ -90,9 +73,8 @@ TEST(Palpation, AResetInTheSlideEndsTheRunAtOnce) {
 }
 
 TEST(Palpation, UnpluggingThePrinterSaysThatTheFingerMayBeInContact) {
-  PalpationBench bench;
-  const PalpationOutcome outcome =
-      bench.run({.passes = 1}, bench.in_slide([&] { bench.rig.unplug_printer(); }));
+  ReadyBench bench;
+  const PalpationOutcome outcome = bench.run({.passes = 1}, [&] { bench.rig.unplug_printer(); });
   EXPECT_THROW(std::rethrow_exception(outcome.error), PortUnplugged);
   EXPECT_EQ(outcome.finger, PalpationOutcome::Finger::unknown);
   EXPECT_NE(outcome.note.find("by hand"), std::string::npos);
