@@ -55,6 +55,7 @@ class JournalWriter {
   void close();
   /// Removes the file, for a run in which nothing was recorded: what is written on has no name.
   void discard();
+  const std::string& path() const { return path_; }
 
  private:
   void run();
