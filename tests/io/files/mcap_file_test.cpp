@@ -1,7 +1,7 @@
 // tests/python/tools_test.py opens what supertac-stream writes in the public readers, by the index and with
 // all sums checked; here stands the hash of a file that one of them (mcap 1.6 of PyPI) has read as it was
-// written: all messages in order, those of a topic and a time, every entry of its indexes, without the summary
-// too.
+// written: all messages in order, those of a topic and a time, every entry of its indexes, without the
+// summary too.
 #include "io/files/mcap_file.h"
 
 #include "io/numbers/hash.h"

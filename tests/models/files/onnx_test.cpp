@@ -1,7 +1,7 @@
-#include "models/files/exports.h"
 #include "data/windows/transforms.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/hash.h"
+#include "models/files/exports.h"
 #include "models/inference/compiled/compiled_model.h"
 #include "tests/models/support.h"
 #include "tests/support/test.h"
