@@ -276,7 +276,7 @@ void BinaryColumns::add_counter(std::size_t column, std::size_t width, bool big_
   if (best == kNever) {  // linear, but in no unit that is known
     found.field = {FrameField::Is::skip, width, ""}, found.bits += 20;
   } else {
-    found.field = {FrameField::Is::time, 0, ""}, found.sure = second - best > 3;
+    found.field = {FrameField::Is::time, 0, ""}, found.sure = second - best > 3 && best < 2;
     // Clocks count from when a sensor was switched on: with each doubling past an hour fewer have run so
     // long.
     found.bits +=

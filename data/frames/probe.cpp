@@ -7,8 +7,10 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <span>
 
 #include "data/frames/binary_columns.h"
+#include "data/frames/binary_decoder.h"
 #include "data/frames/sensor_decoder.h"
 #include "data/frames/text_grammar.h"
 #include "data/sensors/rest_tracker.h"
@@ -46,6 +48,38 @@ HeardFrames frames_of(const Sensor& sensor, std::span<const Heard> heard) {
   const auto counted = decoder->counters();
   frames.frame_bytes = static_cast<double>(counted.bytes - counted.discarded_bytes);
   return frames;
+}
+
+constexpr double kOddJump = 5;  // beside the largest of the others
+
+// How many values at an end of a frame hold what is no signal, such as a checksum of a form that is not
+// known, or 0: as a rule they jump from frame to frame farther than all others do, by several times, or are
+// real numbers of quite another size.
+std::size_t odd_values(const HeardFrames& frames, const std::string& type) {
+  std::vector<double> jumps, sizes;
+  for (const std::vector<float>& signal : frames.signals) {
+    std::vector<double> steps, away;
+    const double middle = median(std::vector(signal));
+    for (std::size_t i = 1; i < signal.size(); ++i)
+      steps.push_back(std::abs(double{signal[i]} - double{signal[i - 1]})),
+          away.push_back(std::abs(signal[i] - middle));
+    const auto [low, high] = std::ranges::minmax(signal);
+    jumps.push_back(std::min(median(steps), median(away)));
+    sizes.push_back(std::max(std::abs(low), std::abs(high)));
+  }
+  const bool real = type == "f32";
+  for (int end = 0; end < 2; ++end) {
+    std::ranges::reverse(jumps), std::ranges::reverse(sizes);
+    for (std::size_t k = 1; k <= 4 / bytes_of(type) && 2 * k <= jumps.size(); ++k) {
+      const double far = std::max(std::ranges::max(std::span(jumps).subspan(k)), real ? 0.0 : 1.0),
+                   large = std::ranges::max(std::span(sizes).subspan(k));
+      for (std::size_t i = 0; i < k; ++i)
+        if (jumps[i] > kOddJump * far ||
+            (real && jumps[i] > 0 && (sizes[i] > 1e4 * large || sizes[i] < 1e-6 * large)))
+          return k;
+    }
+  }
+  return 0;
 }
 
 // Polarity, range, noise and what never moves; into the draft where they are known.
@@ -211,6 +245,13 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   if (frames.count < 2 || frames.frame_bytes < 0.5 * static_cast<double>(bytes.size())) {
     report.says.push_back("only " + std::to_string(frames.count) +
                           " frames were whole; probe for longer (--seconds)");
+    return report;
+  }
+  const bool guessed = !known && draft.frame.kind == FrameKind::binary;
+  if (const std::size_t odd = guessed ? odd_values(frames, draft.frame.type) : 0; odd > 0) {
+    report.says.push_back("nothing is drafted: " + std::to_string(odd) +
+                          " values at an end of the frames move as no signal does: a checksum of a form that "
+                          "is not known, or a counter? Write the file");
     return report;
   }
   if (!found->remark.empty()) report.says.push_back(found->remark);
