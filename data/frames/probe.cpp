@@ -54,12 +54,14 @@ constexpr double kOddJump = 5;  // beside the largest of the others
 
 // How many values at an end of a frame hold what is no signal, such as a checksum of a form that is not
 // known, or 0: as a rule they jump from frame to frame farther than all others do, by several times, or are
-// real numbers of quite another size.
+// real numbers of quite another size. Numbers that no sensor measures (1e-40) are whole frames read amiss.
 std::size_t odd_values(const HeardFrames& frames, const std::string& type) {
+  const bool real = type == "f32";
   std::vector<double> jumps, sizes;
   for (const std::vector<float>& signal : frames.signals) {
     std::vector<double> steps, away;
     const double middle = median(std::vector(signal));
+    if (real && middle != 0 && std::abs(middle) < 1e-30) return frames.signals.size();
     for (std::size_t i = 1; i < signal.size(); ++i)
       steps.push_back(std::abs(double{signal[i]} - double{signal[i - 1]})),
           away.push_back(std::abs(signal[i] - middle));
@@ -67,7 +69,6 @@ std::size_t odd_values(const HeardFrames& frames, const std::string& type) {
     jumps.push_back(std::min(median(steps), median(away)));
     sizes.push_back(std::max(std::abs(low), std::abs(high)));
   }
-  const bool real = type == "f32";
   for (int end = 0; end < 2; ++end) {
     std::ranges::reverse(jumps), std::ranges::reverse(sizes);
     for (std::size_t k = 1; k <= 4 / bytes_of(type) && 2 * k <= jumps.size(); ++k) {
@@ -250,8 +251,8 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   const bool guessed = !known && draft.frame.kind == FrameKind::binary;
   if (const std::size_t odd = guessed ? odd_values(frames, draft.frame.type) : 0; odd > 0) {
     report.says.push_back("nothing is drafted: " + std::to_string(odd) +
-                          " values at an end of the frames move as no signal does: a checksum of a form that "
-                          "is not known, or a counter? Write the file");
+                          " values of a frame move, or are, as no signal: a checksum of a form that is not "
+                          "known, or a counter? Write the file");
     return report;
   }
   if (!found->remark.empty()) report.says.push_back(found->remark);
