@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 
 #include "io/files/file.h"
-#include "io/files/json.h"
 #include "tests/apps/common/process.h"
 
 namespace supertac {
@@ -53,7 +53,9 @@ class WithFolder : public testing::Test {
   static RunningProcess start(const std::string& line) { return start_in(folder_->path(), line); }
   static std::string path(const std::string& name) { return *folder_ / name; }
   static std::string bytes(const std::string& name) { return read_text_file(path(name), 1 << 26); }
-  static nlohmann::ordered_json json(const std::string& name) { return parse_json_limited(bytes(name)); }
+  static nlohmann::ordered_json json(const std::string& name) {
+    return nlohmann::ordered_json::parse(bytes(name));
+  }
 
   static inline std::unique_ptr<TemporaryFolder> folder_;
 };
