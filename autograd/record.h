@@ -61,7 +61,8 @@ Variable record(const char* op, Tensor y, std::initializer_list<const Variable*>
 }
 
 /// Throws std::invalid_argument "op: argument expects EXPECTED, got GOT", as every op refuses an argument:
-/// "conv2d: x expects rank 4, got [2,3]". The checks below do so; those of shapes check_defined(), too.
+/// "conv2d: x expects rank 4, got [2,3]". The checks below do so; those of shapes refuse an empty Variable as
+/// well.
 [[noreturn]] void refuse(const std::string& op, const std::string& argument, const std::string& expected,
                          const std::string& got);
 /// Nine digits of a number, for refuse(): two floats that differ read differently.

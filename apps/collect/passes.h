@@ -32,7 +32,7 @@ struct PassesReport {
 
 /// Turns the journal at `path` into one recording per pass in `folder`, with a line of quality each, and the
 /// plate's STL file, when it has one, from beside the journal. A pass that was cut off is marked incomplete
-/// in its metadata. The same journal gives the same bytes. Throws JournalError, FileError
+/// in its metadata. The same journal gives the same bytes. Throws JournalError, FileError.
 PassesReport write_passes(const Arguments& arguments, const std::string& path, OutputFolder& folder);
 
 }  // namespace supertac

@@ -43,8 +43,9 @@ void write_pictures(const Ensemble& model, const PixelInterval& interval, const 
 /// The page of an evaluation: scores beside those of the baselines, by group or plate (the worst first), zone
 /// and distance since the first contact; the three worst windows in contact of each of the eight worst
 /// groups; the twelve worst windows in contact, and the twelve best of those with texture on a quarter of the
-/// picture, no two of them within 3 mm of one pass; and what made it all. `result` is the evaluation's JSON;
-/// `made_by` says what to repeat it with, a name and a text each. The windows shown are drawn once more.
+/// picture, no two of them within 3 mm of one pass (20 windows where the truth was measured); and what made
+/// it all. `result` is the evaluation's JSON; `made_by` says what to repeat it with, a name and a text each.
+/// The windows shown are drawn once more.
 std::string evaluation_page(const Ensemble& network, const WindowSet& windows,
                             std::span<const ContactScore> scores, const nlohmann::ordered_json& result,
                             const std::vector<std::pair<std::string, std::string>>& made_by);

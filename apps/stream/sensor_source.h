@@ -59,7 +59,7 @@ class SensorSource {
 };
 
 /// Any sensor at its port. With `capture` every byte also goes to a journal of that path. Throws as
-/// open_port().
+/// open_port(), and JournalError.
 std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup,
                                           const std::string& capture = "");
 

@@ -146,11 +146,11 @@ class MetricsAccumulator {
   std::vector<float> sampled_outputs_, sampled_truths_;  // up to kFloorPairs images each
 };
 
-/// All windows, and apart those of each zone: a flat truth is easy and would flatter the mean. One object
-/// serves one thread.
+/// All windows, and apart those in contact, on flat truth and in the air: a flat truth is easy and would
+/// flatter the mean. Windows near a texture count among all only. One object serves one thread.
 class ZoneMetrics {
  public:
-  /// Throws std::invalid_argument when a side is odd or below 4.
+  /// Throws std::invalid_argument when a side is below 4.
   explicit ZoneMetrics(const ImageGrid& grid);
   /// `contact_level`: of a measured truth (WindowSet::contact_level()); what is in contact and goes beyond it
   /// in the outermost pixels counts as edge() as well, and what stays within it shows nothing. Throws

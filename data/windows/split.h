@@ -32,7 +32,8 @@ struct Split {
   std::vector<std::uint32_t> train, test;  ///< indices of windows, ascending
 };
 
-/// The random choices are EpochOrder(count, seed, stream) with stream 0 for windows and groups, 1 for plates,
+/// The random choices are EpochOrder(count, seed, stream) with stream 0 for windows and groups, 1 for plates
+/// and for a group held out,
 /// and 2 + p for the passes of plate p; the first of the order are tested. Plates and groups are counted in
 /// alphabetical order, passes as in WindowSet::passes(); those without windows do not count. A pure function
 /// of the set, kind and seed; trial and none do not use the seed. Throws std::invalid_argument when a side

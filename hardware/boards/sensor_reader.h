@@ -45,8 +45,8 @@ struct ReaderCounters {
 
 struct ReaderSettings {
   std::size_t queue_frames = 4096;
-  double silence_s =
-      0;  ///< without a frame for so long: BoardSilent; 0: 3 s and ten frames, the rig's board 1 s
+  double silence_s = 0;  ///< without a frame for so long: BoardSilent; 0: 3 s or ten frames, whichever is
+                         ///< longer, the rig's board 1 s
 };
 
 /// Reads one sensor by a thread of its own. What ends it is PortUnplugged, BoardSilent or WrongDevice, the

@@ -1,6 +1,7 @@
-// A byte stream with a clock: the only door between the drivers and the world. SerialPort, CapturedPort,
-// ReplayPort (of a sensor) and the simulated ports of the tests are all behind it, so that every line of the
-// drivers runs the same on a real rig and in simulated time.
+// A byte stream with a clock: the only door between the drivers and the world. SerialPort, the descriptors
+// of open_port.cpp (UDP, TCP, files), CapturedPort, ReplayPort (of a sensor) and the simulated ports of the
+// tests are all behind it, so that every line of the drivers runs the same on a real rig and in simulated
+// time.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +29,7 @@ class Port {
  public:
   virtual ~Port() = default;
 
-  /// The path, for messages.
+  /// The path or address, for messages.
   virtual const std::string& name() const = 0;
 
   /// Of a serial line, as the system has set it; 0 where there is none.

@@ -84,7 +84,7 @@ double seconds_left(const Leg& now, const Point3& at) {
 
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Limits& limits) {
   const auto usable = [](double value) { return value > 0 && std::isfinite(value); };
-  if (plan.passes < 1 || plan.passes > 1000 || !usable(plan.slide) || !usable(plan.lift) ||
+  if (plan.passes < 1 || plan.passes > kMostPasses || !usable(plan.slide) || !usable(plan.lift) ||
       !usable(plan.speed)) {
     throw std::invalid_argument("palpation: expected 1 to 1000 passes, and slide, lift and speed above 0");
   }

@@ -39,7 +39,8 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& settin
 struct ModelFile {
   std::unique_ptr<SuperTac> model;
   InputSettings input;
-  std::optional<Novelty> novelty;  ///< of its training windows; empty for single frames and in older files
+  std::optional<Novelty> novelty;  ///< of its training windows; empty of too few windows, and of frames of
+                                   ///< over 1024 signals and in older files
   std::optional<ActivationRanges> ranges;  ///< empty in older files
   std::map<std::string, std::string> metadata;
 

@@ -45,8 +45,8 @@ struct SuperTacSettings {
   Dim signals() const { return rows * columns * in_channels; }  ///< numbers in a frame
   /// VAEs: one for each group of taxels.
   Dim groups() const { return timesteps == 1 ? 0 : grouping == Grouping::horizontal ? rows : columns; }
-  Dim latents() const { return groups() * latent; }  ///< of all groups
-  Dim group_signals() const { return signals() / groups(); }
+  Dim latents() const { return groups() * latent; }           ///< of all groups
+  Dim group_signals() const { return signals() / groups(); }  ///< not of single frames, which have no group
   Dim image_height() const { return rows * scale; }
   Dim image_width() const { return columns * scale; }
   /// Throws std::invalid_argument naming the setting, its range and what was given.

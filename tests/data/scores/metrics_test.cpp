@@ -133,7 +133,6 @@ TEST(MetricsAccumulator, PositionErrorIsTheDisplacementInPixelsAndMillimetres) {
   EXPECT_DOUBLE_EQ(metrics.result().position_error_mm, metrics.result().position_error_px * 0.75);
 }
 
-// A collapsed network must not look as if it knew where things are.
 TEST(MetricsAccumulator, MeasuresPixelsOfAnySize) {
   const ImageGrid grid{8, 24, 0.5};
   ScoredPairs metrics(grid);
@@ -142,6 +141,7 @@ TEST(MetricsAccumulator, MeasuresPixelsOfAnySize) {
   truth_image(Plate::named("4_Blob"), 17, 52, grid, moved);
   metrics.add(moved, truth);
   EXPECT_NEAR(metrics.result().position_error_mm, 1, 0.2);
+  // A collapsed network must not look as if it knew where things are.
   ScoredPairs of_flat(grid);
   of_flat.add(std::vector<float>(grid.pixels(), 0.5F), truth);
   EXPECT_EQ(of_flat.result().position_error_px, 4);  // half the shorter side
