@@ -15,8 +15,8 @@ namespace supertac {
 /// window, normalised when the scaling says so) and nothing else.
 struct Baseline {
   std::string name;
-  /// input [T][signals], any T beyond the delay of the windows (ridge: their own); out [height][width] of the targets. Throws
-  /// std::invalid_argument on other sizes.
+  /// input [T][signals], any T beyond the delay of the windows (ridge: their own); out
+  /// [height][width] of the targets. Throws std::invalid_argument on other sizes.
   std::function<void(std::span<const float> input, std::span<float> out)> predict;
 };
 
