@@ -139,7 +139,8 @@ RecorderSettings read_settings(const Arguments& arguments, const std::string& ou
   if (!bed_given || arguments.given("passes"))
     plan.passes = static_cast<int>(arguments.integer("passes", 1, bed_given ? kMostPasses : rig::kPasses));
   settings.home = arguments.flag("home");
-  (void)planned_s(settings.bed);  // nothing is opened for a plan that leaves the limits
+  // Nothing is opened for a plan that leaves the limits; where homing ends is not known yet.
+  if (!settings.home) (void)legs_within(bed.limits, plan, bed.origin);
   const int trial = trial_of(arguments);
   settings.header = collection_header(plate, trial, plan.speed, settings.sensor, bed);
   settings.journal = journal_path(out, plate, trial, plan.speed);

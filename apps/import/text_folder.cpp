@@ -1,7 +1,10 @@
 #include "apps/import/text_folder.h"
 
+#include <omp.h>
+
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -138,8 +141,12 @@ void import_text_folder(const std::string& root, const FolderImport& settings,
     end = std::find_if(begin, found.end(), [&](const ImportedPass& pass) {
       return pass.recording.plate != begin->recording.plate;
     });
-    settings.progress(static_cast<std::size_t>(begin - found.begin()), found.size());
-    std::vector<ImportedPass> plate = read_and_register(std::span(begin, end), settings);
+    std::vector<ImportedPass> plate;
+    for (auto from = begin, to = from; from != end; from = to) {  // between them Ctrl-C is heard
+      to = from + std::min<std::ptrdiff_t>(omp_get_max_threads(), end - from);
+      settings.progress(static_cast<std::size_t>(from - found.begin()), found.size());
+      std::ranges::move(read_and_register(std::span(from, to), settings), std::back_inserter(plate));
+    }
     if (plate.empty()) continue;
     any = true;
     settings.progress(static_cast<std::size_t>(end - found.begin()), found.size());

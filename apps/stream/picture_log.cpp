@@ -173,22 +173,25 @@ std::string Recorder::stop() {
 std::string Recorder::close(const std::string& why) {
   const std::lock_guard lock(mutex_);
   const std::string name = std::exchange(status_.recording, "");
-  writing_ =
-      std::async(std::launch::async, [this, log = std::move(log_), name, why, before = std::move(writing_)] {
-        if (before.valid()) before.wait();  // one after the other
-        const std::string recorded = "recorded " + name;
-        std::string said = recorded;
-        taken_.clear();
-        try {
-          log->write(metadata_);
-          if (log->empty()) said = "no frame came: nothing was recorded";
-          if (!taken_.empty()) said = taken_;
-        } catch (const std::exception& error) {
-          said = error.what();
-        }
-        const std::lock_guard writing(mutex_);
-        status_.said = said + (why.empty() || said != recorded ? "" : "; " + why);
-      });
+  writing_ = std::async(std::launch::async,
+                        [this, held = std::move(log_), name, why, before = std::move(writing_)]() mutable {
+                          // A future keeps what its function holds: the file goes with this one, and the
+                          // future before with it.
+                          const std::unique_ptr<PictureLog> log = std::move(held);
+                          if (before.valid()) before.get();  // one after the other
+                          const std::string recorded = "recorded " + name;
+                          std::string said = recorded;
+                          taken_.clear();
+                          try {
+                            log->write(metadata_);
+                            if (log->empty()) said = "no frame came: nothing was recorded";
+                            if (!taken_.empty()) said = taken_;
+                          } catch (const std::exception& error) {
+                            said = error.what();
+                          }
+                          const std::lock_guard writing(mutex_);
+                          status_.said = said + (why.empty() || said != recorded ? "" : "; " + why);
+                        });
   return status_.said = "writing " + name;
 }
 

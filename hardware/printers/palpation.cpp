@@ -82,7 +82,7 @@ double seconds_left(const Leg& now, const Point3& at) {
   return distance(at, now.to) / now.speed + now.behind_s;
 }
 
-std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Limits& limits) {
+std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
   const auto usable = [](double value) { return value > 0 && std::isfinite(value); };
   if (plan.passes < 1 || plan.passes > kMostPasses || !usable(plan.slide) || !usable(plan.lift) ||
       !usable(plan.speed)) {
@@ -113,12 +113,17 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Li
   double behind_s = 0;
   for (Leg& leg : legs | std::views::reverse)
     leg.behind_s = std::exchange(behind_s, behind_s + ordered_s(leg));
+  return legs;
+}
+
+std::vector<Leg> legs_within(const Limits& limits, const PalpationPlan& plan, const Point3& here) {
+  std::vector<Leg> legs = legs_of(plan, here);
   for (const Leg& leg : legs) limits.check_path(leg.from, leg.to);
   return legs;
 }
 
 double planned_s(const Bed& bed) {
-  const Leg first = legs_of(bed.plan, bed.origin, bed.limits).front();
+  const Leg first = legs_of(bed.plan, bed.origin).front();
   return seconds_left(first, first.from);
 }
 
@@ -128,7 +133,7 @@ PalpationOutcome run_palpation(Printer& printer, const PalpationPlan& plan,
 }
 
 PalpationOutcome Palpation::run() {
-  std::vector<Leg> legs = legs_of(plan_, printer_.target(), printer_.limits());
+  std::vector<Leg> legs = legs_within(printer_.limits(), plan_, printer_.target());
   std::optional<SoftLimits> soft;
   if (printer_.origin() == Printer::Origin::homed) soft = soft_limits_of(printer_.link());
   for (const Leg& leg : legs) {

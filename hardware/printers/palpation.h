@@ -89,9 +89,10 @@ struct PalpationOutcome {
 };
 
 /// All legs of the plan, from `here` and back (at lifting height or above). Palpation adds some short ones in
-/// the air where a firmware has no M114 R. Throws std::invalid_argument for a plan that makes no sense,
-/// OutsideLimits where a target or the way to it is not allowed.
-std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Limits& limits);
+/// the air where a firmware has no M114 R. Throws std::invalid_argument for a plan that makes no sense.
+std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
+/// The same; throws OutsideLimits, too, where a target or the way to it is not allowed.
+std::vector<Leg> legs_within(const Limits& limits, const PalpationPlan& plan, const Point3& here);
 /// How long a bed's plan takes as ordered (s).
 double planned_s(const Bed& bed);
 

@@ -1,7 +1,6 @@
 // A Marlin printer that carries the finger: absolute moves within limits, verified positions, stops.
 #pragma once
 
-#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,9 +33,10 @@ struct SoftLimits {
   std::string text;  ///< as it said them
 
   bool cut(const Point3& p) const {
-    const Point3 left{std::clamp(p.x, low.x, high.x), std::clamp(p.y, low.y, high.y),
-                      std::clamp(p.z, low.z, high.z)};
-    return distance(p, left) > kToleranceMm;
+    const auto inside = [](double at, double from, double to) {
+      return at >= from - kToleranceMm && at <= to + kToleranceMm;
+    };
+    return !(inside(p.x, low.x, high.x) && inside(p.y, low.y, high.y) && inside(p.z, low.z, high.z));
   }
 };
 /// M211; nothing where they are off or not told.

@@ -196,7 +196,7 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
     if (command.starts_with("G1 ")) numbered.push_back(command);
   });
   bench.settings.reader.silence_s = 5;
-  const std::vector<Leg> legs = legs_of(plan, origin, bench.settings.bed.limits);
+  const std::vector<Leg> legs = legs_within(bench.settings.bed.limits, plan, origin);
   try {
     auto port = rig.printer_port();
     if (printer) port = printer(std::move(port));

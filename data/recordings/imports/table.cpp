@@ -141,8 +141,8 @@ std::string other_than_table(const std::string& whole, const std::vector<std::st
          "; expected a row a line, separated by commas, tabs or blanks";
 }
 
-Table text_table(const std::string& path) {
-  const std::string whole = read_text_file(path, kMaxBytes);
+Table text_table(const std::string& path, std::uint64_t most) {
+  const std::string whole = read_text_file(path, most);
   std::string_view text = whole;
   const auto next = [&] {
     const std::string_view line = text.substr(0, text.find('\n'));
@@ -214,14 +214,15 @@ std::size_t Table::column(const std::string& name) const {
 }
 
 Table read_table(const std::string& path) {
-  if (!path.ends_with(".npy")) return text_table(path);
+  if (!path.ends_with(".npy")) return text_table(path, kMaxBytes);
   FileReader file(path);
   if (file.size() > kMaxBytes) throw FileError(path, "is larger than 4 GiB; cut it into several");
   return numpy_table(path, file);
 }
 
 Recording import_text_pass(const std::string& path, std::size_t& dropped) {
-  const Table table = text_table(path);
+  constexpr std::uint64_t kMost = 64 << 20;  // hours of the rig
+  const Table table = text_table(path, kMost);
   Recording recording;
   recording.source = "imported";
   recording.metadata = {{"time_base", "nominal"}, {"filter_s", format(rig::kFilterS)}};

@@ -201,6 +201,15 @@ TEST_F(RecorderTest, AFileThatAppearedMeanwhileStays) {
   EXPECT_EQ(SafetensorsFile::read(name).f64("time_s").size(), 1U);
 }
 
+TEST_F(RecorderTest, WhatIsWrittenHoldsNoFileOpen) {
+  const auto open_files = [] { return std::distance(fs::directory_iterator("/proc/self/fd"), {}); };
+  Recorder recorder(kFormat, {});
+  const auto before = open_files();
+  for (int i = 0; i < 3; ++i) recorder.start(), recorder.add(seen_at(i)), recorder.stop();
+  for (int i = 0; i < 10'000 && open_files() > before; ++i) usleep(1000);
+  EXPECT_EQ(open_files(), before);
+}
+
 TEST_F(RecorderTest, AFolderThatIsGoneIsSaid) {
   Recorder recorder(kFormat, {});
   fs::remove_all(fs::current_path());

@@ -26,7 +26,7 @@ TEST(Palpation, EightPassesLiftBeforeTheyShift) {
 // From 131.81 mm down to 96.81 at 5 mm/s takes 7 s, onset and release 1 s each, the slide 10.8 s, the way to
 // the next pass, and back to the origin, 2.1623 s.
 TEST(Palpation, TheTimeLeftIsThatOfTheLegsToCome) {
-  const std::vector<Leg> legs = legs_of({.passes = 2}, kMounted, {});
+  const std::vector<Leg> legs = legs_within({}, {.passes = 2}, kMounted);
   EXPECT_NEAR(seconds_left(legs[0], legs[0].from), 43.9246, 1e-3);
   EXPECT_NEAR(seconds_left(legs[6], between(legs[6].from, legs[6].to, 0.5)), 15.5623, 1e-3);
   EXPECT_NEAR(seconds_left(legs[8], legs[8].from), 9.1623, 1e-3) << "upwards, behind the last pass";
@@ -91,7 +91,7 @@ TEST(Bed, WhatAFileLeavesOutIsAsOnTheRig) {
   Bed rest = bed;
   rest.origin = Bed{}.origin, rest.limits = Bed{}.limits, rest.plan.start = Bed{}.plan.start;
   EXPECT_EQ(rest, Bed{});
-  EXPECT_NO_THROW(legs_of(bed.plan, bed.origin, bed.limits));
+  EXPECT_NO_THROW(legs_within(bed.limits, bed.plan, bed.origin));
 }
 
 TEST(Bed, WhatIsWrittenIsReadAgain) {
@@ -151,7 +151,7 @@ TEST(Bed, TheLimitsMoveWithThePlate) {
 
 TEST(Bed, TheExampleIsRead) {
   const Bed bed = read_bed(SUPERTAC_SOURCE "/examples/beds/mini_printer.json");
-  EXPECT_NO_THROW(legs_of(bed.plan, bed.origin, bed.limits));
+  EXPECT_NO_THROW(legs_within(bed.limits, bed.plan, bed.origin));
 }
 
 }  // namespace supertac::palpation_test
