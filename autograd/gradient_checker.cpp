@@ -104,23 +104,23 @@ std::string GradientReport::text() const {
   return out.str();
 }
 
-GradientReport check_gradients(const Function& f, std::vector<Variable> inputs,
+GradientReport check_gradients(const Function& f, std::vector<Variable> leaves,
                                const GradientCheckOptions& options) {
-  for (Variable& leaf : inputs) leaf.mutable_grad() = Tensor();
+  for (Variable& leaf : leaves) leaf.mutable_grad() = Tensor();
   // Twice: the first gradient of a leaf is written, the second is added to it, by other code.
   constexpr int kTimes = 2;
   for (int i = 0; i < kTimes; ++i) backward(weighted(f()));
 
   GradientReport report;
-  std::vector<double> largest(inputs.size());
-  for (std::size_t k = 0; k < inputs.size(); ++k) {
-    const Dim size = inputs[k].size(), count = std::min(size, options.max_entries_per_input);
+  std::vector<double> largest(leaves.size());
+  for (std::size_t k = 0; k < leaves.size(); ++k) {
+    const Dim size = leaves[k].size(), count = std::min(size, options.max_entries_per_input);
     report.elements += size;
-    const Tensor& grad = inputs[k].grad();
+    const Tensor& grad = leaves[k].grad();
     for (Dim i = 0; i < count; ++i) {
       const Dim index = i * size / count;
       const double analytic = grad.defined() ? static_cast<double>(grad.data()[index]) / kTimes : 0;
-      const double numeric = nearest_derivative(f, inputs[k], index, options.step, analytic);
+      const double numeric = nearest_derivative(f, leaves[k], index, options.step, analytic);
       report.worst.push_back({k, index, analytic, numeric, 0, {}});
       largest[k] = std::max(largest[k], std::abs(numeric));
     }
@@ -134,7 +134,7 @@ GradientReport check_gradients(const Function& f, std::vector<Variable> inputs,
     e.relative_error = std::abs(e.analytic - e.numeric) / std::max(scale, 1e-10);
     if (!std::isfinite(e.relative_error)) e.relative_error = 1e30;
     report.wrong += e.relative_error > kGradientTolerance;
-    e.place = place_of(e, inputs[e.input].shape(), options.names);
+    e.place = place_of(e, leaves[e.input].shape(), options.names);
   }
   report.ratio = ratio_of_wrong(report.worst);
   std::sort(report.worst.begin(), report.worst.end(), [](const GradientEntry& a, const GradientEntry& b) {

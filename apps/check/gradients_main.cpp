@@ -1,6 +1,7 @@
 // supertac-check-gradients: what `supertac-check gradients` runs, compiled with real = double.
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <string>
 
 #include "apps/check/gradient_cases.h"

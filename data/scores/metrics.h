@@ -58,7 +58,7 @@ struct PhaseCorrelation {
 /// than a tenth. Without the Hann window two identical ridge images score 1/16: a ridge varies along one axis
 /// only, so all other columns of the spectrum are 0/0. With it they score about .93. The value ignores
 /// amplitude, unrelated images score about .2, and periodic textures alias modulo their pitch. One object
-/// serves one thread: the transforms share its buffers.
+/// serves one thread.
 class PhaseCorrelator {
  public:
   static constexpr double kPeakEpsilon = 1e-12;

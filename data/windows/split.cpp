@@ -122,7 +122,7 @@ Split split_windows(const WindowSet& windows, std::uint64_t seed) {
     if (!windows.passes()[windows.pass_of(i)].use.training_only) own.push_back(i);
   if (own.size() < 2)
     throw std::invalid_argument("split window: the data has " + std::to_string(own.size()) +
-                                " window, needs two: one to train on, one to test on");
+                                " windows, needs two: one to train on, one to test on");
   const EpochOrder order(own.size(), seed, kWindowStream);
   std::vector<bool> tested(windows.size(), false);
   for (std::size_t i = 0; i < test_count(own.size()); ++i) tested[own[order[i]]] = true;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <stdexcept>
 
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"

@@ -12,7 +12,6 @@
 // same bits as one.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <exception>
 #include <functional>

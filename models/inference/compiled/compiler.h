@@ -59,7 +59,8 @@ class Plan {
   std::vector<std::pair<FeatureMap, Tensor Estimate::*>> outputs_;
 };
 
-/// One step for each op, in the order in which they ran; a map's memory is reused behind its last reader.
+/// The steps of the ops, in the order in which they ran (most ops have one); a map's memory is reused behind
+/// its last reader.
 class Compiler : TraceWalk {
  public:
   /// Throws std::logic_error naming an op that has no step.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
-#include <stdexcept>
 
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/losses.h"
