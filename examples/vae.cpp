@@ -1,5 +1,5 @@
 // A variational auto-encoder (Kingma & Welling 2014) with its data, its training and a picture at the end.
-// In 1,500 steps the squared error of a pixel falls to .0014 on pictures never seen, in 4 s on one thread.
+// In 1,500 steps the squared error of a pixel falls to 0.0014 on pictures never seen, in 4 s on one thread.
 //   vae [PICTURE.png]      The picture's rows: domes never trained on, the same through four latent numbers,
 //                          and what the decoder makes of random latent numbers.
 #include <algorithm>

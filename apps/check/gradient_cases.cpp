@@ -28,7 +28,7 @@ Tensor uniform(const Shape& shape, std::uint64_t stream, double low = -1, double
   return t;
 }
 
-// At least .1 from zero, where rectifiers have no derivative.
+// At least 0.1 from zero, where rectifiers have no derivative.
 Tensor off_zero(const Shape& shape) {
   Tensor t = uniform(shape, 1);
   for (real& x : t.values()) x += static_cast<real>(x < 0 ? -0.1 : 0.1);

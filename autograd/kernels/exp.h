@@ -21,7 +21,7 @@ inline float exp_same_bits(float x) {
   const float shifted = x * 1.44269504F + 12582912.0F;  // 1.5 * 2^23: rounds to an integer in the low bits
   const float n = shifted - 12582912.0F;
   const float r = (x - n * 0.693359375F) - n * -2.12194440e-4F;
-  float p = 1.0F / 5040.0F;  // the Taylor series: at |r| < .35 the next term is below 6e-9
+  float p = 1.0F / 5040.0F;  // the Taylor series: at |r| < 0.35 the next term is below 6e-9
   p = p * r + 1.0F / 720.0F;
   p = p * r + 1.0F / 120.0F;
   p = p * r + 1.0F / 24.0F;

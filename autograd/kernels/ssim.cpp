@@ -61,16 +61,16 @@ class SsimImage {
   // x, target, gx [h,w]; S, m, v, c and by_* [oh,ow]; blur^T [oh,ow] -> [h,w]
   void add_gradient(const real* x, const real* target, real g, real* gx) {
     take_moments(x, target);
-    const real each = g / static_cast<real>(oh_ * ow_);
+    const real share = g / static_cast<real>(oh_ * ow_);
     for (Dim i = 0; i < oh_ * ow_; ++i) {
       const Terms t = terms_at(i);
       const real s = t.value();
       const real by_mean = 2 * (t.mean_b * t.n2 / (t.d1 * t.d2) - t.mean_a * s / t.d1);
       const real by_var = t.var_a > 0 ? -s / t.d2 : 0;
       const real by_cov = 2 * t.n1 / (t.d1 * t.d2);
-      by_x_[i] = each * (by_mean - 2 * mean_a_[i] * by_var - mean_b_[i] * by_cov);
-      by_square_[i] = each * 2 * by_var;
-      by_product_[i] = each * by_cov;
+      by_x_[i] = share * (by_mean - 2 * mean_a_[i] * by_var - mean_b_[i] * by_cov);
+      by_square_[i] = share * 2 * by_var;
+      by_product_[i] = share * by_cov;
     }
     add_transposed_blur(by_x_, nullptr, gx);
     add_transposed_blur(by_square_, a_, gx);

@@ -17,7 +17,7 @@ Variable l2_loss(const Variable& x, const Variable& target);
 ///
 ///     (2 mx mt + C1) (2 cov + C2) / ((mx^2 + mt^2 + C1) (vx + vt + C2)),   m means, v variances
 ///
-/// with K1 = .01, K2 = .03, Gaussian 11x11 window of sigma 1.5; for images below 11 pixels a uniform one of
+/// with K1 = 0.01, K2 = 0.03, Gaussian 11x11 window of sigma 1.5; for images below 11 pixels a uniform one of
 /// 7x7, or of the largest odd side that fits; valid window positions only; averaged over positions and
 /// images. Any values are taken. The range is always L = 1, that of images in [0,1]: truths whose troughs
 /// reach to -1 are compared with the same C1 = (K1 L)^2 and C2 = (K2 L)^2 as all others. The gradient flows

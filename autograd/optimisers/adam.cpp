@@ -19,7 +19,7 @@ struct Update {
   real clip, b1, rest1, b2, rest2, rate, correction, epsilon;
 };
 
-// The moments of a parameter without gradient would end as denormal numbers and stay there, since .9 times
+// The moments of a parameter without gradient would end as denormal numbers and stay there, since 0.9 times
 // the smallest rounds back to it; arithmetic with them is 25 times slower. Epsilon hides 1e-30 by far.
 inline real flushed(real x) { return std::abs(x) < real(1e-30) ? real(0) : x; }
 

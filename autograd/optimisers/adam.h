@@ -35,7 +35,7 @@ bool is_matrix(const Shape& shape);
 ///     X <- a X + b (X X^T) X + c (X X^T)^2 X,   a = 3.4445, b = -4.7750, c = 2.0315
 ///
 /// (Jordan et al. 2024, "Muon: An optimizer for hidden layers in neural networks"). They bring singular
-/// values above .01 |x| to between .6 and 1.3; these coefficients are fast and do not converge to 1. All
+/// values above 0.01 |x| to between 0.6 and 1.3; these coefficients are fast and do not converge to 1. All
 /// steps are polynomials of the smaller of X X^T and X^T X and are taken on that.
 void orthogonalise(Dim rows, Dim columns, real* x);
 
@@ -50,7 +50,7 @@ class Adam {
   /// m = b1 m + (1-b1) g;  v = b2 v + (1-b2) g^2;  x -= lr (m / (1-b1^t)) / (sqrt(v / (1-b2^t)) + epsilon).
   ///
   /// For a matrix [R,C] with `muon`, O(X) as orthogonalise():
-  /// m = .95 m + .05 g;  x -= kMuonLength lr sqrt(max(R,C)) O(.95 m + .05 g)
+  /// m = 0.95 m + 0.05 g;  x -= kMuonLength lr sqrt(max(R,C)) O(0.95 m + 0.05 g)
   /// (Jordan et al. 2024; the root, which gives matrices of any shape steps of one length: Liu et al. 2025,
   /// arXiv 2502.16982, eq. 4). Its second moment stays 0.
   ///

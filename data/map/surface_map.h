@@ -29,7 +29,7 @@ struct MapCells {
 /// A window knows more of a point the longer the point has been under the array, so a point is drawn worst
 /// when it is drawn first. The map fuses pictures k = 1, 2 ... of a cell:
 ///   value = sum w v / sum w,    error = sum w e / sum w,    w = (d + 1 um) exp(s / lambda) / e
-/// v, e: the picture and its error, at least .01, at the cell's centre, by Catmull-Rom and by linear
+/// v, e: the picture and its error, at least 0.01, at the cell's centre, by Catmull-Rom and by linear
 /// interpolation (Keys 1981). d: way of the finger (mm) since the picture before, at most a pixel, so that a
 /// finger that stands counts once. s: way since the cell came under the array, at most the side of the
 /// picture L = sqrt(width height), so that what leaves the array last counts most; a cell that is touched

@@ -90,7 +90,7 @@ class Plate {
 ///   plain                                                            1 in 16
 ///   equal elements in rows (ridges, bumps, blobs, waves), or two such textures one behind the other
 ///   lines with a pitch of their own each, some oblique; single lines; scattered round elements; smooth hills
-/// Pitches 4 to 15 mm, heights .5 to 3 mm; more than half of the lines and rounds have the size of the rig's.
+/// Pitches 4 to 15 mm, heights 0.5 to 3 mm; more than half of the lines and rounds are of the rig's size.
 Plate random_plate(std::uint32_t number);
 
 /// True when both have a texture of the same kind whose pitches differ by less than half a millimetre: a

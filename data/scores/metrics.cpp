@@ -12,6 +12,7 @@
 #include "data/plates/truth.h"
 #include "io/numbers/random.h"
 #include "io/numbers/same_bits.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -62,8 +63,8 @@ double local_ssim(const float* a, const float* b, std::size_t stride, const std:
 
 void check_pixels(const char* where, std::size_t got, std::size_t expected) {
   if (got != expected)
-    throw std::invalid_argument(std::string(where) + ": expects " + std::to_string(expected) +
-                                " pixels, got " + std::to_string(got));
+    throw std::invalid_argument(
+        refusal(where, "image", std::to_string(expected) + " pixels", std::to_string(got)));
 }
 
 using Field = std::pair<const char*, double Metrics::*>;
@@ -86,7 +87,7 @@ float extent(std::span<const float> image) {
 }  // namespace
 
 double mean_squared_error(std::span<const float> a, std::span<const float> b) {
-  if (a.empty()) throw std::invalid_argument("mean_squared_error: the images are empty");
+  if (a.empty()) throw std::invalid_argument(refusal("mean_squared_error", "image", "a pixel or more", "0"));
   check_pixels("mean_squared_error", b.size(), a.size());
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -101,7 +102,7 @@ double psnr_db(double mse) { return mse > 0 ? std::min(kPsnrCapDb, -10 * std::lo
 double ssim(std::span<const float> a, std::span<const float> b, std::size_t height, std::size_t width) {
   const std::size_t smaller = std::min(height, width);
   if (smaller < kFewestPixels)
-    throw std::invalid_argument("ssim: size must be at least 3, got " + std::to_string(smaller));
+    throw std::invalid_argument(refusal("ssim", "size", "3 pixels or more", std::to_string(smaller)));
   check_pixels("ssim", a.size(), height * width);
   check_pixels("ssim", b.size(), height * width);
   const std::vector<double> weights = ssim_weights(static_cast<int>(smaller));

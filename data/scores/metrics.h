@@ -31,8 +31,8 @@ double mean_squared_error(std::span<const float> a, std::span<const float> b);
 double psnr_db(double mse);
 
 /// Structural similarity after Wang et al. 2004, mean over the valid positions of the window:
-///   (2 ma mb + C1)(2 sab + C2) / ((ma^2 + mb^2 + C1)(sa^2 + sb^2 + C2)),  C1 = (.01)^2, C2 = (.03)^2 (range
-///   1)
+///   (2 ma mb + C1)(2 sab + C2) / ((ma^2 + mb^2 + C1)(sa^2 + sb^2 + C2)),  C1 = (0.01)^2, C2 = (0.03)^2
+///   (range 1)
 /// Window: Gaussian 11x11, sigma 1.5; for images below 11x11 (on which the Gaussian has no valid position)
 /// uniform, 7x7 or the largest odd size that fits. Weights add up to 1; variances and covariance are centred
 /// sums w (a - ma)(b - mb), never E[ab] - E[a]E[b], which can come out negative. The Gaussian is used when
@@ -54,10 +54,10 @@ struct PhaseCorrelation {
 /// peak is the maximum of surface(kPeakEpsilon). The displacement is the place of the maximum of
 /// surface(kShiftEpsilon), refined by a parabola through it and its two neighbours along each axis: bins
 /// far below the strongest hold rounding and noise and are not asked where the image lies. A larger epsilon
-/// would pull displacements towards 0 (the Hann window stands still): at .1 by up to a third, at .001 by less
-/// than a tenth. Without the Hann window two identical ridge images score 1/16: a ridge varies along one axis
-/// only, so all other columns of the spectrum are 0/0. With it they score about .93. The value ignores
-/// amplitude, unrelated images score about .2, and periodic textures alias modulo their pitch. One object
+/// would pull displacements towards 0 (the Hann window stands still): at 0.1 by up to a third, at 0.001 by
+/// less than a tenth. Without the Hann window two identical ridge images score 1/16: a ridge varies along one
+/// axis only, so all other columns of the spectrum are 0/0. With it they score about 0.93. The value ignores
+/// amplitude, unrelated images score about 0.2, and periodic textures alias modulo their pitch. One object
 /// serves one thread.
 class PhaseCorrelator {
  public:

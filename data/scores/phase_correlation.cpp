@@ -10,6 +10,7 @@
 
 #include "data/scores/metrics.h"
 #include "io/numbers/same_bits.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -34,8 +35,8 @@ double parabola_top(double before, double top, double after) {
 
 PhaseCorrelator::Plans::Plans(int height, int width, bool inverse) {
   if (height < 4 || width < 4)
-    throw std::invalid_argument("phase correlation: sides must be at least 4, got " + std::to_string(height) +
-                                "x" + std::to_string(width));
+    throw std::invalid_argument(refusal("phase correlation", "sides", "4 pixels or more",
+                                        std::to_string(height) + "x" + std::to_string(width)));
   of_rows.reset(kiss_fft_alloc(width, inverse ? 1 : 0, nullptr, nullptr));
   of_columns.reset(kiss_fft_alloc(height, inverse ? 1 : 0, nullptr, nullptr));
   if (!of_rows || !of_columns) throw std::bad_alloc();
@@ -69,8 +70,9 @@ PhaseCorrelator::Spectrum PhaseCorrelator::transformed(const Spectrum& image, co
 // Empty when the image is flat.
 PhaseCorrelator::Spectrum PhaseCorrelator::spectrum_of(std::span<const float> image) const {
   if (image.size() != surface_.size())
-    throw std::invalid_argument("phase correlation: expects " + std::to_string(surface_.size()) +
-                                " pixels, got " + std::to_string(image.size()));
+    throw std::invalid_argument(refusal("phase correlation", "image",
+                                        std::to_string(surface_.size()) + " pixels",
+                                        std::to_string(image.size())));
   double mean = 0;
   for (const float v : image) mean += v;
   mean /= static_cast<double>(image.size());

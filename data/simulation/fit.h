@@ -31,8 +31,8 @@ struct BodyFit {
 };
 
 /// Finds bodies of one sensor. Simulates kSimulations arrays like it (its shape and taxels as stated) with
-/// bodies drawn from what arrays have - skins of .2 to 1.5 pitches, knees from .18 on, crosstalk up to .5,
-/// hysteresis of .01 to 1 s, creep up to .4 within .5 to 10 s, noise of .1 to 1 % -, and regresses each
+/// bodies drawn from what arrays have - skins of 0.2 to 1.5 pitches, knees from 0.18 on, crosstalk up to 0.5,
+/// hysteresis of 0.01 to 1 s, creep up to 0.4 within 0.5 to 10 s, noise of 0.1 to 1 % -, and regresses each
 /// number of a body on the statistics of its touches and their squares.
 class BodyFitter {
  public:
@@ -40,7 +40,7 @@ class BodyFitter {
   /// Throws std::runtime_error where half a minute of its frames has too few of a touch.
   BodyFitter(const Sensor& sensor, std::uint64_t seed);
   /// Applies this to touches of the sensor. The deviation is that of the nearest simulated bodies, each left
-  /// out of its own regression; a number whose deviation is over .6 of what was drawn could not be told:
+  /// out of its own regression; a number whose deviation is over 0.6 of what was drawn could not be told:
   /// crosstalk and creep are left out then, since most arrays have none, and the rest is kept with that
   /// deviation, so that simulations vary it as arrays differ. What the sensor's file states without an
   /// uncertainty is known and stays. Noise and rests are measured, the rests from those that the recording

@@ -80,8 +80,8 @@ constexpr int kFramesOfAPress = 6;
 ///   signal_k = rest - span (response(load))_k + noise, cut to the range,
 /// of the sensor's body (BodyResponse) and scale. Three axes have this for z; x and y lean away from the
 /// pressure, as in FingerModel without drag, and rest in the middle of the range unless the file says where.
-/// What the body's file does not say is drawn for each press - a skin that spreads by .15 to .6 pitches,
-/// noise of .2 to 1 % of the range - and so is what it knows with an uncertainty; every press is up to a
+/// What the body's file does not say is drawn for each press - a skin that spreads by 0.15 to 0.6 pitches,
+/// noise of 0.2 to 1 % of the range - and so is what it knows with an uncertainty; every press is up to a
 /// quarter weaker or stronger, and every taxel 5 % by itself. Silent taxels are filled as live ones are. The
 /// recording has truth, group and plate (the kind) and source "simulated". Deterministic in (sensor, presses,
 /// seed), on any processor. Throws std::invalid_argument for an unknown kind, or an array of other than

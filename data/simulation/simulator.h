@@ -116,7 +116,7 @@ class FingerModel {
 /// The position is where the finger is; the moving average makes the signals trail it by 49 ms, as on the
 /// rig. With SimulatorSettings::wander = w the finger rocks on its way: its slopes across and along are
 /// w n(y), its height is 4 mm w n(y), each with an n of its own: a sum of smooth noises 40, 20, ... 1.25 mm
-/// long whose variances halve, of deviation .85. Deterministic in (plate, pass, settings, seed).
+/// long whose variances halve, of deviation 0.85. Deterministic in (plate, pass, settings, seed).
 /// Throws std::invalid_argument on speeds, rates or paths that make no pass, and as FingerModel.
 Recording simulate_pass(const Plate& plate, const PassSettings& pass, const SimulatorSettings& settings = {},
                         std::uint64_t seed = 1);

@@ -14,7 +14,7 @@ namespace supertac {
 
 EpochOrder::EpochOrder(std::uint64_t count, std::uint64_t seed, std::uint64_t epoch) : count_(count) {
   if (count < 1 || count > std::uint64_t{1} << 32)
-    throw std::invalid_argument("epoch order: count must be 1 to 2^32, got " + std::to_string(count));
+    throw std::invalid_argument(refusal("epoch order", "count", "1 to 2^32", std::to_string(count)));
   half_bits_ = std::max(1, (static_cast<int>(std::bit_width(count - 1)) + 1) / 2);
   const RandomStream random(seed, (stream_named("ord") << 40) ^ epoch);
   for (std::uint64_t r = 0; r < kRounds; ++r)
@@ -33,8 +33,8 @@ std::uint64_t EpochOrder::permute(std::uint64_t value) const {
 
 std::uint64_t EpochOrder::operator[](std::uint64_t i) const {
   if (i >= count_)
-    throw std::invalid_argument("epoch order: index " + std::to_string(i) + " is not below " +
-                                std::to_string(count_));
+    throw std::invalid_argument(
+        refusal("epoch order", "index", "a number below " + std::to_string(count_), std::to_string(i)));
   do {
     i = permute(i);
   } while (i >= count_);
@@ -43,16 +43,18 @@ std::uint64_t EpochOrder::operator[](std::uint64_t i) const {
 
 Batching::Batching(std::vector<std::uint32_t> indices, std::size_t batch, std::uint64_t seed)
     : indices_(std::move(indices)), batch_(batch), seed_(seed) {
-  if (indices_.empty()) throw std::invalid_argument("batching: there is no window to train on");
+  if (indices_.empty())
+    throw std::invalid_argument(refusal("batching", "windows", "one to train on, or more", "none"));
   if (batch < 1) throw std::invalid_argument(refusal("batching", "batch", "1 or more", "0"));
   batch_ = std::min(batch_, indices_.size());
 }
 
 void Batching::batch(std::uint64_t epoch, std::uint64_t b, std::span<std::uint32_t> out) const {
   if (b >= batches_per_epoch() || out.size() != batch_)
-    throw std::invalid_argument("batching: expected a batch below " + std::to_string(batches_per_epoch()) +
-                                " and room for " + std::to_string(batch_) + " windows, got batch " +
-                                std::to_string(b) + " and room for " + std::to_string(out.size()));
+    throw std::invalid_argument(refusal("batching", "batch",
+                                        "a number below " + std::to_string(batches_per_epoch()) +
+                                            " and room for " + std::to_string(batch_) + " windows",
+                                        std::to_string(b) + " and room for " + std::to_string(out.size())));
   const EpochOrder order(indices_.size(), seed_, epoch);
   for (std::size_t i = 0; i < batch_; ++i) out[i] = indices_[order[b * batch_ + i]];
 }

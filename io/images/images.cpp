@@ -7,6 +7,7 @@
 
 #include "io/files/file.h"
 #include "io/numbers/same_bits.h"
+#include "io/numbers/text.h"
 
 #define STB_IMAGE_WRITE_STATIC
 #define STB_IMAGE_WRITE_IMPLEMENTATION
@@ -105,8 +106,9 @@ std::uint8_t level_of(float value) {
 Picture::Picture(int w, int h) : width(w), height(h) {
   constexpr int kMax = 65535;
   if (w < 1 || h < 1 || w > kMax || h > kMax)
-    throw std::invalid_argument("picture: sides must be 1 to 65535 pixels, got " + std::to_string(w) + " x " +
-                                std::to_string(h) + "; draw fewer windows or smaller panels");
+    throw std::invalid_argument(
+        refusal("picture", "sides", "1 to 65535 pixels",
+                std::to_string(w) + "x" + std::to_string(h) + "; draw fewer windows or smaller panels"));
   rgb.assign(static_cast<std::size_t>(w) * static_cast<std::size_t>(h) * 3, 255);
 }
 

@@ -13,7 +13,7 @@ namespace supertac {
 using Rgb = std::array<std::uint8_t, 3>;
 
 /// Perceptual colour map for values 0..1 (others are clipped; not a number is red): dark blue over teal and
-/// green to pale yellow. A path in Oklab (Ottosson 2020) whose lightness grows evenly from .22 to .96, so
+/// green to pale yellow. A path in Oklab (Ottosson 2020) whose lightness grows evenly from 0.22 to 0.96, so
 /// that equal steps of height look equally large and a grey print keeps their order.
 Rgb colour_of(float value);
 /// The step of the map's 256 that a value has: round(255 value), clipped; 0 for not a number.

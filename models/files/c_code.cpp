@@ -258,10 +258,10 @@ void check(const std::string& name, double sensor_hz) {
       !name.empty() && std::isdigit(static_cast<unsigned char>(name[0])) == 0 &&
       std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
   if (!identifier)
-    throw std::invalid_argument("C code: the name must be an identifier of C, such as finger, got " +
-                                in_quotes(name));
+    throw std::invalid_argument(
+        refusal("C code", "name", "an identifier of C, such as finger", in_quotes(name)));
   if (!(sensor_hz >= 1 && sensor_hz <= 100'000))
-    throw std::invalid_argument("C code: the sensor's rate must be 1 to 100000 Hz, got " + format(sensor_hz));
+    throw std::invalid_argument(refusal("C code", "sensor_hz", "1 to 100000", format(sensor_hz)));
 }
 
 }  // namespace

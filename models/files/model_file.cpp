@@ -211,7 +211,7 @@ std::vector<ModelFile> load_models(std::span<const std::string> paths) {
 Precision precision_of(const std::string& name) {
   if (name == "fp32") return Precision::fp32;
   if (name == "int8") return Precision::int8;
-  throw std::invalid_argument("precision must be fp32 or int8, got \"" + name + "\"");
+  throw std::invalid_argument(refusal("model file", "precision", "fp32 or int8", in_quotes(name)));
 }
 
 std::string name_of(Precision precision) { return precision == Precision::int8 ? "int8" : "fp32"; }

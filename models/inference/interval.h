@@ -24,7 +24,7 @@ inline float floored(float predicted_error) { return std::max(predicted_error, k
 /// the first term being, to first order, what a picture `shift` pixels off changes. A predicted error is the
 /// network's, or where `load` is not 0 that of with_load().
 struct PixelInterval {
-  /// By default the least shift (in steps of 1/4) and then the least factor (of .05) that hold 90 % in each
+  /// By default the least shift (in steps of 1/4) and then the least factor (of 0.05) that hold 90 % in each
   /// class of truths of IntervalCoverage on passes held out of trial 1: four plates, preset paper, split
   /// pass, seeds 0 and 1 (docs/map.md).
   double shift = 0.75, factor = 0.55, load = 0;

@@ -133,7 +133,7 @@ std::vector<float> signal_features(std::span<const float> window, const TaxelArr
 Novelty::Novelty(const Tensor& features) {
   const Dim n = features.rank() == 2 ? features.dim(0) : 0, d = features.rank() == 2 ? features.dim(1) : 0;
   if (d < 1 || n <= d)
-    throw std::invalid_argument("novelty: expects features [N,D] with N > D, got " + features.shape().text());
+    throw std::invalid_argument(refusal("novelty", "features", "[N,D] with N > D", features.text()));
   const auto count = static_cast<std::size_t>(n), size = static_cast<std::size_t>(d);
   std::vector<double> mean(size);
   for (std::size_t i = 0; i < count * size; ++i) mean[i % size] += features.values()[i];
@@ -154,8 +154,8 @@ Novelty::Novelty(const Tensor& features) {
 double Novelty::distance(std::span<const float> features) const {
   const std::size_t d = mean_.size();
   if (features.size() != d)
-    throw std::invalid_argument("novelty: expects " + std::to_string(d) + " features, got " +
-                                std::to_string(features.size()));
+    throw std::invalid_argument(refusal("novelty", "features", "[" + std::to_string(d) + "]",
+                                        "[" + std::to_string(features.size()) + "]"));
   double squares = 0;
   for (std::size_t i = 0; i < d; i += kRows) {
     const std::size_t rows = std::min(kRows, d - i);

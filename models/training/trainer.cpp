@@ -178,7 +178,7 @@ void Trainer::run(MicroBatch& micro_batch) const {
   micro_batch.trouble = where_not_finite(loss.total, parameters);
 }
 
-void Trainer::batch_of(std::int64_t step, std::span<std::uint32_t> out) const {
+void Trainer::windows_of_step(std::int64_t step, std::span<std::uint32_t> out) const {
   const auto number = static_cast<std::uint64_t>(step);
   const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
   batching_.batch(number / per_epoch, number % per_epoch, out);
@@ -186,8 +186,8 @@ void Trainer::batch_of(std::int64_t step, std::span<std::uint32_t> out) const {
 
 StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMicroBatch& around) {
   if (done())
-    throw std::invalid_argument("train_step: all " + std::to_string(total_steps()) + " steps are done");
-  batch_of(step(), indices_);
+    refuse("Trainer", "train_step()", "a step of " + std::to_string(total_steps()) + " left", "none");
+  windows_of_step(step(), indices_);
 #pragma omp parallel for schedule(static, 1)
   for (std::size_t i = 0; i < micro_batches_.size(); ++i) {
     try {
@@ -247,7 +247,7 @@ void Trainer::check_finite(const LossTerms& t) const {
     where = its;
     if (!where.empty()) break;
   }
-  stop(t.text() + (where.empty() ? "" : ": " + where));
+  give_up(t.text() + (where.empty() ? "" : ": " + where));
 }
 
 void Trainer::look_for_collapse(StepReport& report) {
@@ -300,7 +300,7 @@ double Trainer::apply() {
   const double norm = adam_.step();
   if (!std::isfinite(norm)) {
     const std::string name = gradient_not_finite(parameters);
-    stop(name.empty() ? "the gradient's norm overflows" : "the gradient of " + name + " is not finite");
+    give_up(name.empty() ? "the gradient's norm overflows" : "the gradient of " + name + " is not finite");
   }
   ++step_;
   return norm;
@@ -314,7 +314,7 @@ std::map<std::string, std::string> Trainer::metadata(std::map<std::string, std::
   return origin;
 }
 
-void Trainer::stop(const std::string& what) const {
+void Trainer::give_up(const std::string& what) const {
   throw TrainingStopped("training stopped at step " + std::to_string(step_ + 1) + ": " + what +
                         "; lower --learning-rate (now " + format(schedule_.peak) +
                         ") or check the input with supertac-info");

@@ -98,10 +98,10 @@ class Trainer {
   void check_same() const;
 
   // For an audit (models/training/audit):
-  /// The windows of the last step.
-  std::span<const std::uint32_t> batch() const { return indices_; }
+  /// The windows of the last step, as many as a batch holds.
+  std::span<const std::uint32_t> last_windows() const { return indices_; }
   /// Those of any step, from 0.
-  void batch_of(std::int64_t step, std::span<std::uint32_t> out) const;
+  void windows_of_step(std::int64_t step, std::span<std::uint32_t> out) const;
   /// Every array of the state: the parameters, then Adam's first and second moments, named as in a
   /// checkpoint.
   void for_each_tensor(const std::function<void(const std::string&, const Tensor&)>& visit) const;
@@ -146,7 +146,7 @@ class Trainer {
   void check_finite(const LossTerms& terms) const;
   void look_for_collapse(StepReport& report);
   /// Throws TrainingStopped: step, `what`, and advice.
-  [[noreturn]] void stop(const std::string& what) const;
+  [[noreturn]] void give_up(const std::string& what) const;
   // Adds up the gradients and moves the weights.
   double apply();
   /// Adam's moments of each parameter, named as in a checkpoint.

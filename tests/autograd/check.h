@@ -1,4 +1,6 @@
-// What the tests of ops share: numbers to feed in, and one-line checks of values, gradients and messages.
+// What the tests of ops share: numbers to feed in, and one-line checks of values, gradients and messages. The
+// gradients of all ops are tested by the rows of apps/check/gradient_cases.cpp: `supertac-check gradients`
+// compares them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
 #pragma once
 
 #include <cmath>

@@ -119,7 +119,7 @@ struct LoadCourse {
 /// Huber norm of three deviations. The deviations of shift and rate are a jackknife's over seconds of the
 /// film. Throws std::runtime_error, saying why, where the courses do not agree: fewer than three touches, or
 /// less in common than kFarthestS, correlation below 0.8, another place nearly as good, or a time that stays
-/// uncertain by more than 4 ms or .04 %.
+/// uncertain by more than 4 ms or 0.04 %.
 FilmClock find_film_clock(const LoadCourse& sensor, const LoadCourse& film);
 constexpr double kFarthestS = 5, kMostRate = 0.025;
 

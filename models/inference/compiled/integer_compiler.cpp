@@ -131,8 +131,8 @@ IntegerCompiler::IntegerCompiler(const SuperTac& network, const ActivationRanges
   const std::vector<TracedOp>& ops = traced.trace.ops();
   const Prediction& drawn = traced.drawn;
   if (ranges.ops() != ops.size())
-    throw std::invalid_argument("CompiledModel: the ranges are those of " + std::to_string(ranges.ops()) +
-                                " ops, the network has " + std::to_string(ops.size()));
+    refuse("CompiledModel", "ranges", "those of the network's " + std::to_string(ops.size()) + " ops",
+           std::to_string(ranges.ops()));
   for (const Parameter& p : network.parameters())
     layers_[p.value.node()] = p.name.substr(0, p.name.rfind('.'));
   for (std::size_t i = 0; i < ops.size(); ++i) scales_[ops[i].y.node()] = ranges.scale(i);

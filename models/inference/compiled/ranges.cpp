@@ -15,8 +15,7 @@ void ActivationRanges::add(const SuperTac& network, const Tensor& inputs) {
   const std::vector<TracedOp>& ops = traced.trace.ops();
   if (low_.empty()) low_.resize(ops.size(), 0), high_ = low_;
   if (low_.size() != ops.size())
-    throw std::invalid_argument("ActivationRanges: expected a network of " + std::to_string(low_.size()) +
-                                " ops, got " + std::to_string(ops.size()));
+    refuse("ActivationRanges", "network", std::to_string(low_.size()) + " ops", std::to_string(ops.size()));
   for (std::size_t i = 0; i < low_.size(); ++i) {
     for (const real value : ops[i].y.value().values()) {
       low_[i] = std::min(low_[i], static_cast<float>(value));

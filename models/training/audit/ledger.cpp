@@ -109,15 +109,15 @@ LedgerWriter::LedgerWriter(const Trainer& trainer, std::int64_t every, const Led
   header_ = Json{{"format", kFormat}, {"every", every}, {"tensors", names}}.dump();
   chain_ = previous != nullptr ? previous->chain : sha256(header_);
   // Batches between that line and a state that lies behind it.
-  std::vector<std::uint32_t> batch(trainer.batch().size());
+  std::vector<std::uint32_t> batch(trainer.last_windows().size());
   for (std::int64_t step = previous != nullptr ? previous->step : 0; step < trainer.step(); ++step) {
-    trainer.batch_of(step, batch);
+    trainer.windows_of_step(step, batch);
     batches_.add(std::as_bytes(std::span(batch)));
   }
 }
 
 std::optional<LedgerLine> LedgerWriter::after_step() {
-  batches_.add(std::as_bytes(trainer_.batch()));
+  batches_.add(std::as_bytes(trainer_.last_windows()));
   if (trainer_.step() % every_ != 0 && !trainer_.done()) return std::nullopt;
   LedgerLine line{
       .step = trainer_.step(), .batches = batches_.hex(), .tensors = hashes_of(trainer_), .chain = {}};

@@ -172,8 +172,7 @@ void add_update(Json& operators, const Trainer& trainer, Opening& opening, const
 
 OpenedStep open_step(Trainer& trainer, const std::optional<std::string>& keep) {
   if (trainer.ranks() > 1)
-    throw std::invalid_argument("open_step: expected a training in one process, found " +
-                                std::to_string(trainer.ranks()));
+    refuse("open_step", "trainer", "a training in one process", std::to_string(trainer.ranks()));
   OpenedStep opened{.step = trainer.step() + 1, .operators = Json::array(), .arrays = {}};
   Opening opening(keep, opened);
   trainer.for_each_tensor([&](const std::string& name, const Tensor& of) {
@@ -194,8 +193,8 @@ OpenedStep open_step(Trainer& trainer, const std::optional<std::string>& keep) {
       });
   opened.operators.push_back({{"name", "batch"},
                               {"op", "batch"},
-                              {"examples", trainer.batch()},
-                              {"outputs", {hash_of(trainer.batch())}}});
+                              {"examples", trainer.last_windows()},
+                              {"outputs", {hash_of(trainer.last_windows())}}});
   std::vector<std::vector<std::string>> of_parameters(trainer.model().parameters().size());
   for (std::size_t number = 0; number < operators.size(); ++number) {
     opened.operators.insert(opened.operators.end(), operators[number].begin(), operators[number].end());

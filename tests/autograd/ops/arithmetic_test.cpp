@@ -1,5 +1,3 @@
-// Rows of apps/check/gradient_cases.cpp have the gradients of these ops: `supertac-check gradients` compares
-// them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
 #include "autograd/ops/arithmetic.h"
 
 #include "tests/autograd/check.h"
@@ -27,7 +25,7 @@ TEST(Arithmetic, OneVariableMayBeBothArguments) {
 }
 
 TEST(Arithmetic, SumOfManyKeepsItsDigits) {
-  const Dim n = 1'000'003;  // a float accumulator would stop counting at 2^24 / .1
+  const Dim n = 1'000'003;  // a float accumulator would stop counting at 2^24 / 0.1
   EXPECT_NEAR(static_cast<double>(sum(Variable(Tensor::full({n}, real(0.1)))).item()), 100000.3, 0.01);
 }
 

@@ -1,5 +1,3 @@
-// Rows of apps/check/gradient_cases.cpp have the gradients of these ops: `supertac-check gradients` compares
-// them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
 #include "autograd/ops/convolution.h"
 
 #include "autograd/ops/arithmetic.h"
@@ -53,8 +51,7 @@ TEST(Conv, RefusesEmptyOutputs) {
       conv2d(x, w, b, {}));
   EXPECT_REFUSAL(
       "conv_transpose2d: x expects pixels for an output of 1 or more with w [3,3,3,4], stride 1 and padding "
-      "2, "
-      "got [1,2,2,3]",
+      "2, got [1,2,2,3]",
       conv_transpose2d(x, w, b, {.padding = 2}));
 }
 

@@ -1,6 +1,3 @@
-// Rows of apps/check/gradient_cases.cpp have the gradients of these ops: `supertac-check gradients` compares
-// them with differences, tests/layers/gradient_test.cpp tries them empty and with planted errors.
-// take_runs() and last_frame() have no gradient.
 #include "autograd/ops/shaping.h"
 
 #include "autograd/ops/arithmetic.h"

@@ -65,7 +65,7 @@ TEST(Elements, NoiseBelowHalfOfATopMakesNone) {
 
 TEST(Elements, AreNoneWhereTheirIntervalReachesTheFloor) {
   EXPECT_EQ(elements(map_of("4_Ridges", kPlate, 0.69F)).size(), 4U);
-  EXPECT_TRUE(elements(map_of("4_Ridges", kPlate, 0.71F)).empty());  // a pixel of a ridge's top has .7
+  EXPECT_TRUE(elements(map_of("4_Ridges", kPlate, 0.71F)).empty());  // a pixel of a ridge's top has 0.7
 }
 
 TEST(Elements, AMoveOfAMillimetreIsFoundAndThreeAreNot) {

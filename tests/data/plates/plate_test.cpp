@@ -155,7 +155,7 @@ TEST(PlateFile, WindowsTakeTheirTruthFromIt) {
   for (std::size_t i = 0; i < set.size(); i += 50) {
     set.truth(i, truth);
     named.truth(i, expected);
-    double squares = 0;  // the foot of a blob is upright: single pixels there may differ by .1
+    double squares = 0;  // the foot of a blob is upright: single pixels there may differ by 0.1
     for (std::size_t k = 0; k < truth.size(); ++k) squares += std::pow(double{truth[k] - expected[k]}, 2);
     EXPECT_LT(std::sqrt(squares / 256), 0.02) << i;
   }

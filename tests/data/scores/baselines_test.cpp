@@ -72,7 +72,7 @@ TEST(Bicubic, ReproducesARampBetweenTheTaxels) {
 }
 
 TEST(Bicubic, HasKeysWeights) {
-  // Row 7 of 16: u = 7.5/4 - .5 = 1.375; a lone taxel in row 1 weighs k(.375) there.
+  // Row 7 of 16: u = 7.5/4 - 0.5 = 1.375; a lone taxel in row 1 weighs k(0.375) there.
   std::vector<float> frame(16, 0.0F);
   for (std::size_t c = 0; c < 4; ++c) frame[4 + c] = 1;
   const double d = 0.375;
@@ -90,7 +90,7 @@ TEST(Bicubic, TakesArraysOfAnyShape) {
   EXPECT_LT(bicubic[0], bicubic[18]);
 }
 
-// The least-squares line is shrunk below 1 / .5 because bicubic misses part of the shape.
+// The least-squares line is shrunk below 1 / 0.5 because bicubic misses part of the shape.
 TEST(Baselines, UndoTheScaleOfTheSignal) {
   const WindowSet set = surface_windows(0.2, 0.5);
   const Baseline bicubic = upsampled_frame(set, all_of(set));
@@ -206,7 +206,7 @@ TEST(Ridge, IsLinearInTheWindow) {
   for (std::size_t p = 0; p < 256; ++p) ASSERT_NEAR(middle[p], (a[p] + b[p]) / 2, 1e-4);
 }
 
-// With the least penalty the noise of few windows would be learned by heart (.35 instead of .16).
+// With the least penalty the noise of few windows would be learned by heart (0.35 instead of 0.16).
 TEST(Ridge, NoiseRaisesThePenalty) {
   const WindowSet set = make_ridge_set(0.3);
   const Split split = make_split(set, SplitKind::pass, 1);

@@ -94,8 +94,8 @@ TEST(Ssim, AgreesWithHandComputedWindow) {
 }
 
 TEST(Ssim, RefusesImagesWithoutAValidPosition) {
-  EXPECT_REFUSAL("ssim: size must be at least 3, got 2", ssim(flat(0, 2), flat(0, 2)));
-  EXPECT_REFUSAL("ssim: expects 256 pixels, got 64", ssim(flat(0, 16), flat(0, 8)));
+  EXPECT_REFUSAL("ssim: size expects 3 pixels or more, got 2", ssim(flat(0, 2), flat(0, 2)));
+  EXPECT_REFUSAL("ssim: image expects 256 pixels, got 64", ssim(flat(0, 16), flat(0, 8)));
 }
 
 TEST(MetricsAccumulator, OfNothingIsNull) {
@@ -214,8 +214,8 @@ Image with_noise(Image image, double level, std::uint64_t stream) {
   return image;
 }
 
-// FIELD: two identical ridges have .0625 without a Hann window, .937 with it, .31 with noise of .05 in both;
-// images of noise alone have .21.
+// FIELD: two identical ridges have 0.0625 without a Hann window, 0.937 with it, 0.31 with noise of 0.05 in
+// both; images of noise alone have 0.21.
 TEST(PhaseCorrelation, IdenticalRidgesAgreeBecauseOfTheHannWindow) {
   PhaseCorrelator correlator(16, 16);
   for (const auto& [name, level, expected] : {std::tuple("ridges6", 0.0, 0.937),
@@ -271,10 +271,10 @@ TEST(PhaseCorrelation, FlatImagesHaveNoPhase) {
 }
 
 TEST(PhaseCorrelation, RefusesOtherSizes) {
-  EXPECT_REFUSAL("phase correlation: sides must be at least 4, got 8x2", PhaseCorrelator(8, 2));
+  EXPECT_REFUSAL("phase correlation: sides expects 4 pixels or more, got 8x2", PhaseCorrelator(8, 2));
   PhaseCorrelator correlator(8, 8);
   const std::vector<float> small(64), large(65);
-  EXPECT_REFUSAL("phase correlation: expects 64 pixels, got 65", correlator(small, large));
+  EXPECT_REFUSAL("phase correlation: image expects 64 pixels, got 65", correlator(small, large));
 }
 
 // Every size that an array of up to 64x64 taxels and a scale of 2, 4 or 8 can give, but for the largest,

@@ -70,7 +70,7 @@ TEST(SignFlip, RandomPatternsAgreeWithAllOfThem) {
   EXPECT_LT(exact, 0.2);
 }
 
-// Under the null hypothesis p is uniform: at most 5 % below .05.
+// Under the null hypothesis p is uniform: at most 5 % below 0.05.
 TEST(SignFlip, RejectsATrueHypothesisAsOftenAsItSays) {
   const RandomStream random(3, 0);
   int rejected = 0;

@@ -47,8 +47,8 @@ TEST(EpochOrder, Mixes) {
 }
 
 TEST(EpochOrder, RefusesNothing) {
-  EXPECT_REFUSAL("epoch order: count must be 1 to 2^32, got 0", EpochOrder(0, 1, 1));
-  EXPECT_REFUSAL("epoch order: index 5 is not below 5", EpochOrder(5, 1, 1)[5]);
+  EXPECT_REFUSAL("epoch order: count expects 1 to 2^32, got 0", EpochOrder(0, 1, 1));
+  EXPECT_REFUSAL("epoch order: index expects a number below 5, got 5", EpochOrder(5, 1, 1)[5]);
 }
 
 std::vector<std::uint32_t> hundred() {
@@ -98,13 +98,13 @@ TEST(Batching, FewerWindowsThanABatchMakeOneBatch) {
 }
 
 TEST(Batching, RefusesWhatIsNotThere) {
-  EXPECT_REFUSAL("batching: there is no window to train on", Batching({}, 16, 3));
+  EXPECT_REFUSAL("batching: windows expects one to train on, or more, got none", Batching({}, 16, 3));
   EXPECT_REFUSAL("batching: batch expects 1 or more, got 0", Batching(hundred(), 0, 3));
   const Batching batching(hundred(), 16, 3);
   std::vector<std::uint32_t> batch(16), small(15);
-  EXPECT_REFUSAL("batching: expected a batch below 6 and room for 16 windows, got batch 6 and room for 16",
+  EXPECT_REFUSAL("batching: batch expects a number below 6 and room for 16 windows, got 6 and room for 16",
                  batching.batch(0, 6, batch));
-  EXPECT_REFUSAL("batching: expected a batch below 6 and room for 16 windows, got batch 0 and room for 15",
+  EXPECT_REFUSAL("batching: batch expects a number below 6 and room for 16 windows, got 0 and room for 15",
                  batching.batch(0, 0, small));
 }
 

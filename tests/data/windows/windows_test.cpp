@@ -63,7 +63,7 @@ TEST(Windows, NeverCrossTheEdgeOfAPass) {
     const auto window = set.raw_window(i);
     const bool first = set.pass_of(i) == 0;
     for (const float v : window)
-      ASSERT_EQ(v < 0.7F, first) << i;  // (3 - 2) / 2 = .5 against (3 - 1.2) / 2 = .9
+      ASSERT_EQ(v < 0.7F, first) << i;  // (3 - 2) / 2 = 0.5 against (3 - 1.2) / 2 = 0.9
   }
   EXPECT_EQ(set.passes()[1].first_window, 25U);
   EXPECT_EQ(set.passes()[1].windows, 25U);

@@ -40,7 +40,7 @@ TEST(ColourMap, ClipsAndShowsWhatIsNotANumber) {
 }
 
 TEST(PanelGrid, DrawsYUpwardsAndXToTheRight) {
-  const std::vector<float> values{0, 0.25F, 0.5F, 1};  // row 0 (small y): 0, .25; row 1: .5, 1
+  const std::vector<float> values{0, 0.25F, 0.5F, 1};  // row 0 (small y): 0, 0.25; row 1: 0.5, 1
   const Picture picture = panel_grid(std::vector<PanelValues>{{values, 2, 2}}, 1, 4);
   EXPECT_EQ(picture.at(1, 4), colour_of(0));
   EXPECT_EQ(picture.at(4, 4), colour_of(0.25F));

@@ -204,11 +204,11 @@ TEST(CCode, SeveralModelsFitIntoOneUnit) {
 
 TEST(CCode, RefusesWhatIsNoNameOrRateOrHasNoRanges) {
   ModelFile file = model_of(tiny(), {});
-  EXPECT_REFUSAL("C code: the name must be an identifier of C, such as finger, got '1st'",
+  EXPECT_REFUSAL("C code: name expects an identifier of C, such as finger, got '1st'",
                  c_code_of(file, "1st", 100));
-  EXPECT_REFUSAL("C code: the name must be an identifier of C, such as finger, got 'a b'",
+  EXPECT_REFUSAL("C code: name expects an identifier of C, such as finger, got 'a b'",
                  c_code_of(file, "a b", 100));
-  EXPECT_REFUSAL("C code: the sensor's rate must be 1 to 100000 Hz, got 0", c_code_of(file, "finger", 0));
+  EXPECT_REFUSAL("C code: sensor_hz expects 1 to 100000, got 0", c_code_of(file, "finger", 0));
   file.ranges.reset();
   EXPECT_EQ(what_of<std::runtime_error>([&] { c_code_of(file, "finger", 100); }),
             "the model was saved without the ranges of its values, which int8 needs; train it anew with this "

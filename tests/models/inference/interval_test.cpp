@@ -18,7 +18,7 @@ TEST(PixelInterval, GrowsWithTheSlopeAndThePredictedError) {
   ASSERT_EQ(widths.size(), 12U);
   for (std::size_t i = 0; i < 12; ++i) EXPECT_FLOAT_EQ(widths[i], expected[i]) << i;
   PixelInterval{0, 5}.half_widths(picture, 4, std::vector<float>(12, -3.0F), widths);
-  EXPECT_FLOAT_EQ(widths[6], 0.05F) << "no predicted error is below .01";
+  EXPECT_FLOAT_EQ(widths[6], 0.05F) << "no predicted error is below 0.01";
   PixelInterval{0, 50}.half_widths(picture, 4, errors, widths);
   EXPECT_FLOAT_EQ(widths[6], 1) << "truths lie in 0 to 1";
   PixelInterval{}.half_widths(picture, 4, {}, widths);
@@ -57,7 +57,7 @@ TEST(PixelInterval, ALoadIsThatOfThePixelsTaxel) {
 }
 
 // Errors of 0.1, 0.2 .. 1 where 0.1 was predicted: a factor of 9 covers nine of ten, and in a class a tenth
-// as far off one of .9; the larger one is for all.
+// as far off one of 0.9; the larger one is for all.
 TEST(IntervalCoverage, FindsTheFactorThatHoldsEachHeight) {
   std::vector<float> truth(20, 0.0F), picture(20), predicted(20, 0.1F);
   for (std::size_t i = 0; i < 10; ++i) picture[i] = 0.1F * static_cast<float>(i) + 0.097F;

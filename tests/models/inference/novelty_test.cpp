@@ -36,7 +36,7 @@ TEST(Novelty, FeaturesThatNeverVaryAreNoTrouble) {
   const Novelty novelty(Tensor::full({10, 2}, real(0.5)));
   const real same[] = {0.5, 0.5}, moved[] = {0.5, 0.6F};
   EXPECT_EQ(novelty.distance(same), 0);
-  EXPECT_NEAR(novelty.distance(moved), 0.1 / std::sqrt(0.001) / std::sqrt(2), 0.01);  // least variance .001
+  EXPECT_NEAR(novelty.distance(moved), 0.1 / std::sqrt(0.001) / std::sqrt(2), 0.01);  // least variance 0.001
 }
 
 TEST(Novelty, TravelsInTheModelFile) {
@@ -56,9 +56,9 @@ TEST(Novelty, TravelsInTheModelFile) {
 }
 
 TEST(Novelty, RefusesTooFewFeatures) {
-  EXPECT_REFUSAL("novelty: expects features [N,D] with N > D, got [3,3]", Novelty(plane(3)));
+  EXPECT_REFUSAL("novelty: features expects [N,D] with N > D, got [3,3]", Novelty(plane(3)));
   const real two[] = {0, 0};
-  EXPECT_REFUSAL("novelty: expects 3 features, got 2", Novelty(plane(10)).distance(two));
+  EXPECT_REFUSAL("novelty: features expects [3], got [2]", Novelty(plane(10)).distance(two));
 }
 
 // A trained model knows its own windows again, and not those of a sensor with a stuck taxel.

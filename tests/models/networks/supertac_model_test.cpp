@@ -107,6 +107,10 @@ TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
   const std::pair<SuperTacSettings, const char*> refused[] = {
       {{.timesteps = 40}, "timesteps expects a multiple of 16 (the encoder halves four times) or 1, got 40"},
       {{.timesteps = 1024}, "timesteps expects 32 to 512, got 1024"},
+      {{.in_channels = 9}, "in_channels expects 1 to 8, got 9"},
+      {{.latent = 0}, "latent expects 1 to 256, got 0"},
+      {{.channels = 2}, "channels expects 4 to 256, got 2"},
+      {{.rcabs = 17}, "rcabs expects 0 to 16, got 17"},
       {{.scale = 3}, "scale expects 2, 4, 8 or 16, got 3"},
       {{.columns = 65}, "columns expects 1 to 64, got 65"},
       {{.rows = 65, .timesteps = 1}, "rows expects 1 to 64, got 65"},

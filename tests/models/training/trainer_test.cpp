@@ -20,8 +20,9 @@ TEST(Trainer, Learns) {
   double last = 0;
   while (!trainer.done()) last = trainer.train_step().l2;
   EXPECT_LT(last, first / 4);
-  EXPECT_REFUSAL("train_step: all " + std::to_string(trainer.total_steps()) + " steps are done",
-                 trainer.train_step());
+  EXPECT_REFUSAL(
+      "Trainer: train_step() expects a step of " + std::to_string(trainer.total_steps()) + " left, got none",
+      trainer.train_step());
 }
 
 // Without noise the picture of the first step is that of inference.
@@ -223,7 +224,8 @@ TEST(Trainer, ReportsPicturesThatAreTheSameForAllAndIdleLatents) {
 TEST(Trainer, RefusesWindowsOfAnotherFormatOrNoneAndWhatTheArrayCannotDo) {
   SmallTraining small;
   const WindowSet& windows = small.windows;
-  EXPECT_REFUSAL("batching: there is no window to train on", Trainer(windows, {}, small.recipe));
+  EXPECT_REFUSAL("batching: windows expects one to train on, or more, got none",
+                 Trainer(windows, {}, small.recipe));
   small.recipe.model.timesteps = 48;
   EXPECT_REFUSAL(
       "the data have 32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8, the model "

@@ -132,7 +132,7 @@ TEST(CompiledModel, RefusesTheRangesOfAnotherNetworkAndInputsOfAnotherShape) {
   EXPECT_REFUSAL("CompiledModel: inputs expects [N,32,16], got [1,3,16]",
                  CompiledModel(network).estimate(Tensor::zeros({1, 3, 16})));
   EXPECT_EQ(CompiledModel(network).estimate(Tensor::zeros(network.input_shape(0))).picture.dim(0), 0);
-  EXPECT_REFUSAL("CompiledModel: the ranges are those of 0 ops, the network has 46",
+  EXPECT_REFUSAL("CompiledModel: ranges expects those of the network's 46 ops, got 0",
                  CompiledModel(network, ActivationRanges()));
 }
 
