@@ -40,7 +40,7 @@ std::string define(const std::string& name, const std::string& value, const std:
 
 std::string at(int i) { return "&maps[" + std::to_string(i) + "]"; }
 
-std::string shape_of(const IntegerMap& m) {
+std::string shape_of(const c99::map& m) {
   return (m.height > 1 ? "[" + text(m.height) + "]" : "") +
          (m.height * m.width > 1 ? "[" + text(m.width) + "]" : "") + "[" + text(m.channels) + "] " +
          (m.bytes ? "bytes" : "numbers");
@@ -49,12 +49,11 @@ std::string shape_of(const IntegerMap& m) {
 std::string maps_of(const IntegerPlan& plan) {
   std::string out = "static const struct map maps[] = {\n";
   for (std::size_t i = 0; i < plan.maps.size(); ++i) {
-    const IntegerMap& m = plan.maps[i];
+    const c99::map& m = plan.maps[i];
     const auto writer = std::ranges::find(plan.steps, static_cast<int>(i),
                                           [](const IntegerStep& s) { return s.maps.back(); });
     out += "    {" +
-           list({m.offset, m.height, m.width, m.channels, m.margin_h, m.margin_w, m.bytes ? 1 : 0,
-                 m.bytes ? m.scale.zero : 0}) +
+           list({m.offset, m.height, m.width, m.channels, m.margin_h, m.margin_w, m.bytes, m.zero}) +
            "}, /* " + std::to_string(i) + ": " + writer->name + ", " + shape_of(m) + " */\n";
   }
   return out + "};\n";
@@ -62,26 +61,26 @@ std::string maps_of(const IntegerPlan& plan) {
 
 std::string product_of(const IntegerPlan& plan, const IntegerStep& s, const std::string& name) {
   const bool bytes = plan.map(s.maps[0]).bytes;
-  const std::vector<std::uint8_t>& w = s.packed;
-  const QuantisedProduct& q = s.weights;
+  const std::vector<std::uint8_t>& w = s.weights;
+  const c99::product& p = s.product;
   std::string out = "/* " + s.name + ": " + shape_of(plan.map(s.maps[0])) + " -> " +
-                    shape_of(plan.map(s.maps[1])) + ", " + text(q.rows) + " weights an output */\n";
+                    shape_of(plan.map(s.maps[1])) + ", " + text(p.segments * p.length) +
+                    " weights an output */\n";
   constexpr std::size_t kPerLine = 24;
   out += std::string(bytes ? "static const uint8_t " : "static const int8_t ") + name + "_weights[" +
          std::to_string(w.size()) + "] = {";
   for (std::size_t i = 0; i < w.size(); ++i)
     out += (i % kPerLine == 0 ? "\n    " : " ") +
            std::to_string(bytes ? w[i] : static_cast<std::int8_t>(w[i])) + ",";
-  out +=
-      "\n};\nstatic const struct outcome " + name + "_outcomes[" + std::to_string(q.offset.size()) + "] = {";
-  for (std::size_t o = 0; o < q.offset.size(); ++o)
-    out += (o % 4 == 0 ? "\n    {" : " {") + std::to_string(q.offset[o]) + ", " +
-           std::to_string(q.multiplier[o]) + ", " + std::to_string(q.shift[o]) + "},";
-  const ProductTaps& t = s.taps;
+  out += "\n};\nstatic const struct outcome " + name + "_outcomes[" + std::to_string(s.outcomes.size()) +
+         "] = {";
+  for (std::size_t o = 0; o < s.outcomes.size(); ++o)
+    out += (o % 4 == 0 ? "\n    {" : " {") + std::to_string(s.outcomes[o].offset) + ", " +
+           std::to_string(s.outcomes[o].multiplier) + ", " + std::to_string(s.outcomes[o].shift) + "},";
   out += "\n};\nstatic const struct product " + name + " = {" + name + "_weights, " + name + "_outcomes, " +
-         list({t.height, t.width, q.outputs, t.length, static_cast<Dim>(t.segments.size()), s.negative_slope,
-               t.from.line, t.from.pixel, t.to.line, t.to.pixel, t.y_offset}) +
-         ", {" + list(t.segments) + "}};\n\n";
+         list({p.height, p.width, p.outputs, p.length, p.segments, p.slope, p.x_line, p.x_pixel, p.y_line,
+               p.y_pixel, p.y_first}) +
+         ", {" + list(std::vector<Dim>(p.segment, p.segment + p.segments)) + "}};\n\n";
   return out;
 }
 
@@ -92,7 +91,7 @@ std::string network_of(const IntegerPlan& plan) {
   for (const IntegerStep& s : plan.steps) {
     std::vector<std::string> arguments;
     if (s.function == "take_input") arguments.emplace_back("from");
-    if (!s.packed.empty()) {
+    if (!s.weights.empty()) {
       const std::string whole = "NAME_" + replaced(s.name, ".", "_");
       std::string name = whole;
       for (int part = 1; !taken.insert(name).second; ++part) name = whole + "_" + std::to_string(part);
@@ -271,7 +270,7 @@ CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz
   check(name, sensor_hz);
   const auto plan = IntegerPlan::of(*file.model, file.int8_ranges());
   std::size_t weights = 0;  // bytes
-  for (const IntegerStep& s : plan->steps) weights += s.packed.size() + 8 * s.weights.offset.size();
+  for (const IntegerStep& s : plan->steps) weights += s.weights.size() + 8 * s.outcomes.size();
   const std::string top = "/* " + name + ": tactile super-resolution, written by supertac-export";
   const std::string body =
       define("SIGNALS", "UPPER_SIGNALS") + define("TIMESTEPS", "UPPER_TIMESTEPS") +
@@ -280,8 +279,8 @@ CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz
       window_constants(file, sensor_hz) +
       "\nunion work_area {\n  int32_t aligned;\n  uint8_t bytes[WORK_BYTES];\n};\nstatic union work_area "
       "work;\n" +
-      define("WORK", "work.bytes") + "\n" + kKernels + "\n/* ---- The network. ---- */\n\n" + maps_of(*plan) +
-      "\n" + network_of(*plan) + kWindow;
+      define("WORK", "work.bytes") + "\n" + kTypes + "\n" + kKernels + "\n/* ---- The network. ---- */\n\n" +
+      maps_of(*plan) + "\n" + network_of(*plan) + kWindow;
   const Privacy names = privacy_of(body);
   std::string upper = name;
   std::ranges::transform(upper, upper.begin(), [](unsigned char c) { return std::toupper(c); });

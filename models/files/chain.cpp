@@ -35,12 +35,14 @@ ChainLink int8_link(const SafetensorsFile& file, const ModelFile& model) {
   const auto plan = IntegerPlan::of(*model.model, model.int8_ranges());
   for (const IntegerStep& s : plan->steps) {
     add_text(sum, s.name);
-    add(sum, s.packed);
-    for (const auto* numbers : {&s.weights.offset, &s.weights.multiplier, &s.weights.shift})
-      add(sum, *numbers);
+    add(sum, s.weights);
+    std::vector<std::int32_t> offsets, multipliers, shifts;
+    for (const c99::outcome& o : s.outcomes)
+      offsets.push_back(o.offset), multipliers.push_back(o.multiplier), shifts.push_back(o.shift);
+    for (const auto* all : {&offsets, &multipliers, &shifts}) add(sum, *all);
     const auto& n = s.numbers;
     add(sum, n.size() < 3 ? std::vector{1, 0, 0} : std::vector(n.end() - 3, n.end()));  // multiplier, ...
-    add(sum, std::vector{s.negative_slope});
+    add(sum, std::vector<std::int32_t>{s.weights.empty() ? IntegerStep::kNoSlope : s.product.slope});
   }
   return {"int8", sum.hex()};
 }

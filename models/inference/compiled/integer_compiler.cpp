@@ -16,12 +16,55 @@
 #include <stdexcept>
 
 #include "models/inference/compiled/integer_plan.h"
+#include "models/inference/compiled/taps.h"
 
 namespace supertac {
 namespace {
 
 constexpr int kMultiplierBits = 6, kLeastShift = 6, kMostShift = 29;
 constexpr double kLargestWeight = 127, kMostSum = 1 << 30, kMostOffset = 1 << 29;
+
+// As kernels.c counts it.
+template <class Whole>
+Whole narrow(Dim value) {
+  const auto whole = static_cast<Whole>(value);
+  if (static_cast<Dim>(whole) == value) return whole;
+  throw std::runtime_error("int8: a layer has a size or a distance of " + std::to_string(value) +
+                           ", expected at most " + std::to_string(std::numeric_limits<Whole>::max()) +
+                           "; train a network of fewer channels, or for a smaller array");
+}
+
+// A map, whose offset is in bytes and whose margin has the value that stands for 0, in memory that is reused
+// behind the last step that reads it. Either bytes, each map with a scale of its own, or numbers of 16 bits
+// in steps of 2^-fraction_bits, for what bytes would be too coarse for: sums of residual blocks, latents, the
+// picture.
+struct IntegerMap : FeatureMap {
+  bool bytes = false;
+  Scale scale;
+
+  Dim size() const { return image() * (bytes ? 1 : 2); }  // bytes
+  c99::map c99() const {
+    return {.offset = narrow<std::int32_t>(offset),
+            .height = narrow<std::int16_t>(height),
+            .width = narrow<std::int16_t>(width),
+            .channels = narrow<std::int16_t>(channels),
+            .margin_h = narrow<std::int16_t>(margin_h),
+            .margin_w = narrow<std::int16_t>(margin_w),
+            .bytes = bytes,
+            .zero = static_cast<std::uint8_t>(bytes ? scale.zero : 0)};
+  }
+};
+
+// Sums of a product: s[o] = sum over k of x[k] * w[k, o], where x are whole numbers of scale `from`, become
+//   v[o] = (s[o] * multiplier[o] + offset[o]) >> shift[o]
+// in steps of `to`, zero not yet added. A weight's step is chosen so that multiplier / 2^shift is exact:
+//   w = q * step_w[o],   step_w[o] = multiplier[o] / 2^shift[o] * to.step / from.step,   |q| <= 127
+// The multiplier has six bits, so that for sums of bytes nothing overflows 32 bits, in vectors or on a
+// microcontroller; of sums of 16-bit numbers the product takes 64.
+struct QuantisedProduct {
+  std::vector<std::int8_t> w;  // [rows][outputs]
+  std::vector<c99::outcome> outcomes;
+};
 
 // The smallest multiplier / 2^shift that is no less than `target`, as fine as the bits allow.
 struct Factor {
@@ -43,17 +86,18 @@ Factor factor_of(double target, double bias_steps) {
 QuantisedProduct quantise(Dim rows, std::span<const real> w, std::span<const real> bias, const Scale& from,
                           const Scale& to) {
   const auto count = static_cast<std::size_t>(rows), outputs = bias.size();
-  QuantisedProduct q{rows, static_cast<Dim>(outputs), std::vector<std::int8_t>(w.size()), {}, {}, {}};
-  std::vector<double> sums(outputs);
+  QuantisedProduct q{std::vector<std::int8_t>(w.size()), {}};
   for (std::size_t o = 0; o < outputs; ++o) {
     double largest = 0;
     for (std::size_t k = 0; k < count; ++k)
       largest = std::max(largest, std::abs(static_cast<double>(w[k * outputs + o])));
     const double bias_steps = static_cast<double>(bias[o]) / to.step;
     Factor factor = factor_of(largest / kLargestWeight * from.step / to.step, bias_steps);
+    double sum = 0;
     for (bool fits = false; !fits;) {
       const double step = factor.value() * to.step / from.step;
-      double sum = 0, magnitude = 0;
+      double magnitude = 0;
+      sum = 0;
       for (std::size_t k = 0; k < count; ++k) {
         const double whole = std::clamp(std::rint(static_cast<double>(w[k * outputs + o]) / step),
                                         -kLargestWeight, kLargestWeight);
@@ -61,20 +105,15 @@ QuantisedProduct quantise(Dim rows, std::span<const real> w, std::span<const rea
         sum += whole, magnitude += std::abs(whole);
       }
       const double most = magnitude * from.largest;
-      sums[o] = sum;
       fits = from.largest > 255 ? most < 2 * kMostSum : most * factor.multiplier <= kMostSum;
       if (fits || factor.multiplier == 1) break;
       factor = factor.shift > kLeastShift ? Factor{(factor.multiplier + 1) / 2, factor.shift - 1}
                                           : Factor{factor.multiplier / 2, factor.shift};
     }
-    q.multiplier.push_back(factor.multiplier);
-    q.shift.push_back(factor.shift);
-  }
-  for (std::size_t o = 0; o < outputs; ++o) {
-    const double scaled = std::ldexp(static_cast<double>(bias[o]) / to.step, q.shift[o]);
-    q.offset.push_back((1 << (q.shift[o] - 1)) +
-                       static_cast<std::int32_t>(std::rint(std::clamp(scaled, -kMostOffset, kMostOffset) -
-                                                           sums[o] * from.zero * q.multiplier[o])));
+    const double scaled = std::clamp(std::ldexp(bias_steps, factor.shift), -kMostOffset, kMostOffset),
+                 offset = std::rint(scaled - sum * from.zero * factor.multiplier);
+    q.outcomes.push_back({(1 << (factor.shift - 1)) + static_cast<std::int32_t>(offset),
+                          narrow<std::uint16_t>(factor.multiplier), narrow<std::uint16_t>(factor.shift)});
   }
   return q;
 }
@@ -107,16 +146,17 @@ class IntegerCompiler : TraceWalk {
   bool as_bytes(Id id) const { return read_as_bytes_.contains(id); }
   bool as_numbers(Id id) const { return read_as_numbers_.contains(id); }
   int new_map(const Variable& y, bool bytes);
-  IntegerMap& map(int i) { return plan_->maps[static_cast<std::size_t>(i)]; }
+  const IntegerMap& map(int i) const { return maps_[static_cast<std::size_t>(i)]; }
   int numbers_of(const Variable& x) const { return numbers_.at(owner(x)); }
   IntegerStep& add(std::string function, std::string name, std::vector<int> maps,
                    std::vector<std::int32_t> numbers = {});
-  void add_product(const TracedOp& op, int x, int y, ProductTaps taps);
+  void add_product(const TracedOp& op, int x, int y, const ProductTaps& taps);
   void add_bytes(const Variable& y);
   void release(std::size_t op);
   std::string layer_of(const TracedOp& op) const;
 
   std::shared_ptr<IntegerPlan> plan_ = std::make_shared<IntegerPlan>();
+  std::vector<IntegerMap> maps_;      // of the plan
   std::map<Id, std::string> layers_;  // by weight
   std::map<Id, Scale> scales_;        // as bytes
   std::set<Id> read_as_bytes_, read_as_numbers_;
@@ -185,8 +225,9 @@ int IntegerCompiler::new_map(const Variable& y, bool bytes) {
     m.offset = std::max(m.offset, end);
   }
   plan_->work_area = std::max(plan_->work_area, m.offset + rounded(m.size()));
-  plan_->maps.push_back(m);
-  const int index = static_cast<int>(plan_->maps.size()) - 1;
+  maps_.push_back(m);
+  plan_->maps.push_back(m.c99());
+  const int index = static_cast<int>(maps_.size()) - 1;
   live_[index] = y.node();
   (bytes ? bytes_ : numbers_)[y.node()] = index;
   return index;
@@ -219,7 +260,7 @@ void IntegerCompiler::make(const TracedOp& op) {
     const bool bytes_out = bytes_in && as_bytes(op.y.node()) && !as_numbers(op.y.node());
     const int x = bytes_in ? bytes_.at(owner(op.inputs[0])) : numbers_of(op.inputs[0]);
     const int y = new_map(op.y, bytes_out);
-    for (ProductTaps& taps : products_of(op, map(x), map(y))) add_product(op, x, y, std::move(taps));
+    for (const ProductTaps& taps : products_of(op, map(x), map(y))) add_product(op, x, y, taps);
     if (bytes_out) return;
   } else if (op.op == "unflatten_channels_first") {
     add("copy", "unflatten", {numbers_of(op.inputs[0]), new_map(op.y, false)}, {0});
@@ -270,40 +311,55 @@ void IntegerCompiler::concat(const TracedOp& op, int y) {
   }
 }
 
-std::vector<std::uint8_t> packed(const QuantisedProduct& q, bool bytes) {
+// w [rows][outputs] as kernels.c takes it (IntegerStep::weights).
+std::vector<std::uint8_t> packed(const std::vector<std::int8_t>& w, Dim rows, Dim outputs, bool bytes) {
   const Dim run = bytes ? kFour : 1;
   std::vector<std::uint8_t> out;
-  for (Dim first = 0; first < q.outputs; first += run)
-    for (Dim begin = 0; begin < q.rows; begin += run)
+  for (Dim first = 0; first < outputs; first += run)
+    for (Dim begin = 0; begin < rows; begin += run)
       for (Dim o = first; o < first + run; ++o)
         for (Dim k = begin; k < begin + run; ++k) {
-          const int w = o < q.outputs ? q.w[static_cast<std::size_t>(k * q.outputs + o)] : 0;
-          out.push_back(static_cast<std::uint8_t>(bytes ? w + 128 : w));
+          const int weight = o < outputs ? w[static_cast<std::size_t>(k * outputs + o)] : 0;
+          out.push_back(static_cast<std::uint8_t>(bytes ? weight + 128 : weight));
         }
   return out;
 }
 
-void IntegerCompiler::add_product(const TracedOp& op, int x, int y, ProductTaps t) {
+void IntegerCompiler::add_product(const TracedOp& op, int x, int y, const ProductTaps& t) {
   constexpr double kSlopes = IntegerStep::kNoSlope;
-  const auto slope = static_cast<std::int32_t>(std::lrint(op.settings.negative_slope * kSlopes));
+  const Dim slope = std::lrint(op.settings.negative_slope * kSlopes);
   if (slope != IntegerStep::kNoSlope && (slope < 0 || slope > 63))
     throw std::logic_error("CompiledModel: a negative slope of " +
                            std::to_string(op.settings.negative_slope) + " has no step in whole numbers");
   IntegerStep& s = add(map(x).bytes ? "product_of_bytes" : "product_of_numbers", layer_of(op), {x, y});
-  const Dim rows = static_cast<Dim>(t.segments.size()) * t.length;
-  s.weights = quantise(rows, t.w.values(), t.bias.values(), map(x).scale, map(y).scale);
-  s.packed = packed(s.weights, map(x).bytes);
-  s.negative_slope = slope;
-  s.taps = std::move(t);
+  const Dim outputs = t.bias.size(), rows = static_cast<Dim>(t.segments.size()) * t.length;
+  QuantisedProduct q = quantise(rows, t.w.values(), t.bias.values(), map(x).scale, map(y).scale);
+  s.outcomes = std::move(q.outcomes);
+  s.weights = packed(q.w, rows, outputs, map(x).bytes);
+  s.product = {.weights = s.weights.data(),
+               .outcomes = s.outcomes.data(),
+               .height = narrow<std::int16_t>(t.height),
+               .width = narrow<std::int16_t>(t.width),
+               .outputs = narrow<std::int16_t>(outputs),
+               .length = narrow<std::int16_t>(t.length),
+               .segments = narrow<std::int16_t>(std::ssize(t.segments)),
+               .slope = narrow<std::int16_t>(slope),
+               .x_line = narrow<std::int32_t>(t.from.line),
+               .x_pixel = narrow<std::int32_t>(t.from.pixel),
+               .y_line = narrow<std::int32_t>(t.to.line),
+               .y_pixel = narrow<std::int32_t>(t.to.pixel),
+               .y_first = narrow<std::int32_t>(t.y_offset),
+               .segment = {}};
+  if (t.segments.size() > std::size(s.product.segment))
+    throw std::runtime_error("int8: a kernel of over four rows is not supported");
+  std::ranges::transform(t.segments, s.product.segment, narrow<std::int32_t>);
 }
 
 }  // namespace
 
 std::shared_ptr<const IntegerPlan> IntegerPlan::of(const SuperTac& network, const ActivationRanges& ranges) {
   const TracedPrediction traced(network, Tensor::zeros(network.input_shape(1)));
-  const std::shared_ptr<IntegerPlan> plan = IntegerCompiler(network, ranges, traced).plan();
-  plan->compile();
-  return plan;
+  return IntegerCompiler(network, ranges, traced).plan();
 }
 
 }  // namespace supertac
