@@ -111,36 +111,18 @@ std::string table_of(const std::vector<NamedMap>& maps) {
   return table;
 }
 
-// A box whose top has a point at each cell's centre: the cells in a frame of points at the bottom, whose
-// places are those of the outermost cells.
+// With a point at each cell's centre.
 std::vector<Triangle> solid_of(const NamedMap& map) {
-  const MapRegion& r = map.cells.region;
   const double bottom = -kSunkMm - kSolidBaseMm;
-  using Point = std::array<float, 3>;
-  const auto point = [&](std::int64_t row, std::int64_t column, bool top) {
-    const std::int64_t i = std::clamp<std::int64_t>(row, 0, r.height - 1),
-                       k = std::clamp<std::int64_t>(column, 0, r.width - 1);
-    const float value = map.cells.values[static_cast<std::size_t>(i * r.width + k)];
+  std::vector<Vertex> points;
+  for (std::size_t c = 0; c < map.cells.values.size(); ++c) {
+    const auto [x, y] = centre_of(map, c);
+    const float value = map.cells.values[c];
     const double z = std::isnan(value) ? -kSunkMm : rig::kTextureHeightMm * double{value};
-    return Point{static_cast<float>((static_cast<double>(r.left + k) + 0.5) * map.cell_mm.x),
-                 static_cast<float>((static_cast<double>(r.bottom + i) + 0.5) * map.cell_mm.y),
-                 static_cast<float>(top && i == row && k == column ? std::max(z, bottom + 0.1) : bottom)};
-  };
-  std::vector<Triangle> solid;
-  for (std::int64_t i = -1; i < r.height; ++i) {
-    for (std::int64_t k = -1; k < r.width; ++k) {
-      const bool wall_y = i < 0 || i == r.height - 1, wall_x = k < 0 || k == r.width - 1;
-      if (wall_x && wall_y) continue;  // a corner of the frame has no area
-      for (const bool top : {true, false}) {
-        if (!top && (wall_x || wall_y)) continue;
-        const Point a = point(i, k, top), b = point(i, k + 1, top), c = point(i + 1, k + 1, top),
-                    d = point(i + 1, k, top);
-        solid.push_back(top ? Triangle{a, b, c} : Triangle{a, c, b});
-        solid.push_back(top ? Triangle{a, c, d} : Triangle{a, d, c});
-      }
-    }
+    points.push_back(
+        {static_cast<float>(x), static_cast<float>(y), static_cast<float>(std::max(z, bottom + 0.1))});
   }
-  return solid;
+  return solid_under(points, static_cast<std::size_t>(map.cells.region.width), static_cast<float>(bottom));
 }
 
 }  // namespace

@@ -12,8 +12,6 @@ namespace {
 constexpr double kStepMm = HeightMap::kCellMm;
 constexpr double kSliverMm = 1e-3;  // lines, and heights, closer than this are one
 
-using Vertex = std::array<float, 3>;
-
 // These lines, low and high, and the multiples of the step between, none of them slivers.
 std::vector<double> lattice(double low, double high, std::vector<double> lines = {}) {
   lines.insert(lines.end(), {low, high});
@@ -31,13 +29,6 @@ std::vector<double> lines_along_y(const Plate& plate) {
   return lattice(begin, std::max(begin, plate.texture_end()), std::move(lines));
 }
 
-// The top's points, row by row; xs and ys ascend.
-struct Top {
-  std::vector<double> xs, ys;
-  std::vector<Vertex> points;
-  const Vertex& at(std::size_t row, std::size_t column) const { return points[row * xs.size() + column]; }
-};
-
 // Surfaces that were read count as uniform_in_x() within more than a solid may be off.
 bool is_same_along_x(const Plate& plate, const std::vector<double>& xs, const std::vector<double>& ys) {
   return std::ranges::all_of(ys, [&](double y) {
@@ -46,45 +37,31 @@ bool is_same_along_x(const Plate& plate, const std::vector<double>& xs, const st
   });
 }
 
-Top top_of(const Plate& plate) {
-  Top top;
-  top.xs = lattice(0, rig::kPlateWidthMm);
-  top.ys = lines_along_y(plate);
-  if (is_same_along_x(plate, top.xs, top.ys)) top.xs = {0, rig::kPlateWidthMm};
-  for (const double y : top.ys)
-    for (const double x : top.xs)
-      top.points.push_back(
-          {static_cast<float>(x), static_cast<float>(y), static_cast<float>(plate.height(x, y))});
-  return top;
-}
-
-// The top's outline, counter-clockwise seen from above, each point once.
-std::vector<Vertex> outline_of(const Top& top) {
-  const std::size_t last_row = top.ys.size() - 1, last_column = top.xs.size() - 1;
+// Of a surface, counter-clockwise seen from above, each point once.
+std::vector<Vertex> outline_of(const std::vector<Vertex>& points, std::size_t columns) {
+  const std::size_t last_row = points.size() / columns - 1, last_column = columns - 1;
+  const auto at = [&](std::size_t row, std::size_t column) { return points[row * columns + column]; };
   std::vector<Vertex> outline;
-  for (std::size_t c = 0; c < last_column; ++c) outline.push_back(top.at(0, c));
-  for (std::size_t r = 0; r < last_row; ++r) outline.push_back(top.at(r, last_column));
-  for (std::size_t c = last_column; c > 0; --c) outline.push_back(top.at(last_row, c));
-  for (std::size_t r = last_row; r > 0; --r) outline.push_back(top.at(r, 0));
+  for (std::size_t c = 0; c < last_column; ++c) outline.push_back(at(0, c));
+  for (std::size_t r = 0; r < last_row; ++r) outline.push_back(at(r, last_column));
+  for (std::size_t c = last_column; c > 0; --c) outline.push_back(at(last_row, c));
+  for (std::size_t r = last_row; r > 0; --r) outline.push_back(at(r, 0));
   return outline;
 }
 
 }  // namespace
 
-std::vector<Triangle> mesh_of(const Plate& plate) {
-  const Top top = top_of(plate);
-  const auto bottom = static_cast<float>(plate.min_height() - kSolidBaseMm);
+std::vector<Triangle> solid_under(const std::vector<Vertex>& points, std::size_t columns, float bottom) {
   std::vector<Triangle> solid;
   const auto add_quad = [&](const Vertex& a, const Vertex& b, const Vertex& c, const Vertex& d) {
     solid.push_back({a, b, c});
     solid.push_back({a, c, d});
   };
-  for (std::size_t r = 0; r + 1 < top.ys.size(); ++r)
-    for (std::size_t c = 0; c + 1 < top.xs.size(); ++c)
-      add_quad(top.at(r, c), top.at(r, c + 1), top.at(r + 1, c + 1), top.at(r + 1, c));
-  const auto outline = outline_of(top);
-  const Vertex centre = {static_cast<float>(rig::kPlateWidthMm / 2),
-                         static_cast<float>(rig::kPlateLengthMm / 2), bottom};
+  for (std::size_t p = columns; p < points.size(); ++p)
+    if (p % columns != 0) add_quad(points[p - columns - 1], points[p - columns], points[p], points[p - 1]);
+  const std::vector<Vertex> outline = outline_of(points, columns);
+  const Vertex &first = points.front(), &last = points.back();
+  const Vertex centre = {(first[0] + last[0]) / 2, (first[1] + last[1]) / 2, bottom};
   for (std::size_t i = 0; i < outline.size(); ++i) {
     const Vertex &a = outline[i], &b = outline[(i + 1) % outline.size()];
     const Vertex below_a = {a[0], a[1], bottom}, below_b = {b[0], b[1], bottom};
@@ -92,6 +69,18 @@ std::vector<Triangle> mesh_of(const Plate& plate) {
     solid.push_back({centre, below_b, below_a});
   }
   return solid;
+}
+
+std::vector<Triangle> mesh_of(const Plate& plate) {
+  std::vector<double> xs = lattice(0, rig::kPlateWidthMm);
+  const std::vector<double> ys = lines_along_y(plate);
+  if (is_same_along_x(plate, xs, ys)) xs = {0, rig::kPlateWidthMm};
+  std::vector<Vertex> points;
+  for (const double y : ys)
+    for (const double x : xs)
+      points.push_back(
+          {static_cast<float>(x), static_cast<float>(y), static_cast<float>(plate.height(x, y))});
+  return solid_under(points, xs.size(), static_cast<float>(plate.min_height() - kSolidBaseMm));
 }
 
 }  // namespace supertac

@@ -14,8 +14,9 @@
 
 namespace supertac {
 
-/// Corners counter-clockwise seen from outside, each (x, y, z) in mm.
-using Triangle = std::array<std::array<float, 3>, 3>;
+using Vertex = std::array<float, 3>;  ///< (x, y, z) in mm
+/// Corners counter-clockwise seen from outside.
+using Triangle = std::array<Vertex, 3>;
 
 constexpr std::uint64_t kMaxStlBytes = 512 << 20;  ///< read and written
 constexpr float kMaxStlCoordinateMm = 1e6F;        ///< beyond any printer, and a sum could overflow
@@ -78,12 +79,16 @@ class HeightMap {
 /// Material of a solid below its lowest point.
 inline constexpr double kSolidBaseMm = 3;
 
-/// The plate as a solid to print, in its own coordinates: textured top, four walls, flat bottom. Closed and
-/// manifold (every edge belongs to two triangles, in opposite directions), outside by the right-hand rule.
-/// Heights are exact at points HeightMap::kCellMm apart in the textured part, and straight between them;
-/// lines along x are placed on every crest and where the texture begins and ends, so that peaks keep their
-/// height. A plate that was read from STL is the same plate when it is written and read again. A texture that
-/// varies along y only has no points between its sides.
+/// A surface as a solid: its points [rows][columns] over a rectangle, in lines along x and y that ascend,
+/// four walls, and a flat bottom at z = `bottom`. Closed and manifold (every edge belongs to two triangles,
+/// in opposite directions), outside by the right-hand rule. There must be two lines of each at least.
+std::vector<Triangle> solid_under(const std::vector<Vertex>& points, std::size_t columns, float bottom);
+
+/// The plate as a solid to print, in its own coordinates: solid_under() its textured top. Heights are exact
+/// at points HeightMap::kCellMm apart in the textured part, and straight between them; lines along x are
+/// placed on every crest and where the texture begins and ends, so that peaks keep their height. A plate that
+/// was read from STL is the same plate when it is written and read again. A texture that varies along y only
+/// has no points between its sides.
 std::vector<Triangle> mesh_of(const Plate& plate);
 
 }  // namespace supertac
