@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "data/simulation/simulator.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/same_bits.h"
@@ -18,7 +19,6 @@ constexpr double kStrength = 0.25, kTaxelSpread = 0.05;
 constexpr double kGive = 0.25;  // of the skin: how far a hard press goes into it
 constexpr double kMarginSigmas = 2.5;
 constexpr double kNarrowest = 0.25;  // of a cell: a bell that is narrower would fall between cells
-constexpr int kPointsOfATaxel = 16;
 
 enum PressDraw : std::uint64_t { kSkin, kNoise, kOfStrength, kTimes = 10, kFit = 100, kTaxels = 1000 };
 constexpr std::uint64_t kSamples = 1'000'000;
@@ -39,31 +39,11 @@ Body drawn(Body body, const TaxelArray& array, const RandomStream& random) {
   return body;
 }
 
-// Weights of cells for the lines of taxels, [lines][cells], each line with sum 1, as the skin's bell is felt
-// over a taxel's side; and those of a lean.
-struct Bells {
-  std::vector<double> weight, lean;
-  Bells(int lines, double pitch, int cells, double first, double step, const Body& body) {
-    const double skin = std::max(body.skin_mm / 2, kNarrowest * step),
-                 sigma = std::max(body.sigma_mm(), skin);
-    const int points = body.taxel_mm > 0 ? kPointsOfATaxel : 1;
-    for (int line = 0; line < lines; ++line) {
-      const double at = (line - (lines - 1) / 2.0) * pitch;
-      std::vector<double> bell(static_cast<std::size_t>(cells));
-      double sum = 0;
-      for (int i = 0; i < cells; ++i) {
-        double& felt = bell[static_cast<std::size_t>(i)];
-        for (int p = 0; p < points; ++p)
-          felt += same_bits::bell(first + i * step - at - body.taxel_mm * ((p + 0.5) / points - 0.5), skin);
-        sum += felt;
-      }
-      for (int i = 0; i < cells; ++i) {
-        weight.push_back(bell[static_cast<std::size_t>(i)] / sum);
-        lean.push_back(weight.back() * (first + i * step - at) / sigma);
-      }
-    }
-  }
-};
+// Of the cells of a field, as the skin's bell is felt over a taxel's side.
+TaxelWeights weights_of(int lines, double pitch, int cells, double first, double step, const Body& body) {
+  const double skin = std::max(body.skin_mm / 2, kNarrowest * step);
+  return {lines, pitch, cells, first, step, skin, std::max(body.sigma_mm(), skin), body.taxel_mm};
+}
 
 // The truth's pixels, and as many around them as a taxel at the edge feels.
 Field field_of(const TaxelArray& array, int scale, double sigma_mm) {
@@ -87,10 +67,10 @@ class Press {
         random_(random),
         scene_(objects, sensor.array, of_scene),
         field_(field_of(sensor.array, scale, body_.sigma_mm())),
-        across_(sensor.array.columns, sensor.array.pitch_mm.x, field_.columns, field_.left_mm,
-                field_.cell_x_mm, body_),
-        along_(sensor.array.rows, sensor.array.pitch_mm.y, field_.rows, field_.top_mm, field_.cell_y_mm,
-               body_),
+        across_(weights_of(sensor.array.columns, sensor.array.pitch_mm.x, field_.columns, field_.left_mm,
+                           field_.cell_x_mm, body_)),
+        along_(weights_of(sensor.array.rows, sensor.array.pitch_mm.y, field_.rows, field_.top_mm,
+                          field_.cell_y_mm, body_)),
         response_(body_, sensor.array),
         strength_(1 + kStrength * (2 * random.uniform(kOfStrength) - 1)),
         pace_(pace),
@@ -126,8 +106,10 @@ class Press {
                channels = static_cast<std::size_t>(sensor_.array.channels);
     std::vector<double> shares(taxels * channels);
     for (std::size_t channel = 0; channel < channels; ++channel) {
-      const std::vector<double> load = felt(channels == 3 && channel == 0 ? across_.lean : across_.weight,
-                                            channels == 3 && channel == 1 ? along_.lean : along_.weight);
+      const std::vector<double> load =
+          felt(sensor_.array, pressure_, 1, static_cast<std::size_t>(field_.columns),
+               channels == 3 && channel == 0 ? across_.lean : across_.load,
+               channels == 3 && channel == 1 ? along_.lean : along_.load);
       for (std::size_t k = 0; k < taxels; ++k)
         shares[k * channels + channel] =
             load[k] * strength_ * (1 + kTaxelSpread * random_.normal(kTaxels + k));
@@ -137,28 +119,12 @@ class Press {
     return shares;
   }
 
-  std::vector<double> felt(const std::vector<double>& across, const std::vector<double>& along) const {
-    const auto rows = static_cast<std::size_t>(field_.rows),
-               columns = static_cast<std::size_t>(field_.columns),
-               taxel_rows = static_cast<std::size_t>(sensor_.array.rows),
-               taxel_columns = static_cast<std::size_t>(sensor_.array.columns);
-    std::vector<double> lines(taxel_rows * columns), load(taxel_rows * taxel_columns);
-    for (std::size_t y = 0; y < taxel_rows; ++y)
-      for (std::size_t r = 0; r < rows; ++r)
-        if (const double w = along[y * rows + r]; w != 0)
-          for (std::size_t c = 0; c < columns; ++c) lines[y * columns + c] += w * pressure_[r * columns + c];
-    for (std::size_t k = 0; k < load.size(); ++k)
-      for (std::size_t c = 0; c < columns; ++c)
-        load[k] += across[k % taxel_columns * columns + c] * lines[k / taxel_columns * columns + c];
-    return load;
-  }
-
   const Sensor& sensor_;
   Body body_;
   RandomStream random_;
   Scene scene_;
   Field field_;
-  Bells across_, along_;
+  TaxelWeights across_, along_;
   BodyResponse response_;
   double strength_, pace_, before_ = 0;
   std::uint64_t samples_ = 0;

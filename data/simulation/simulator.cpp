@@ -4,6 +4,7 @@
 #include <cmath>
 #include <deque>
 #include <numbers>
+#include <numeric>
 #include <stdexcept>
 
 #include "io/numbers/hash.h"
@@ -20,6 +21,8 @@ constexpr double kGain[rig::kTaxels] = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20
 // Of three axes: how far below rest those along the plate are where nothing leans, and the skin that is
 // dragged.
 constexpr double kMiddleVolts = (rig::kRestVolts - rig::kFloorVolts) / 2, kFriction = 0.3;
+
+constexpr int kPointsOfATaxel = 16;  // along its side
 
 // Points of the pad. Along the slide they are as fine as the tip of a ridge; across it little changes.
 constexpr double kAcrossMm = 2, kAlongMm = 0.25;
@@ -43,26 +46,51 @@ constexpr int kRows = static_cast<int>((rig::kPlateLengthMm + 2 * kMarginMm) / k
 // As often half as twice.
 double factor(double v) { return v >= 0 ? 1 + v : 1 / (1 - v); }
 
-TaxelWeights taxel_weights(int lines, double pitch, int points, double step, double sigma) {
-  TaxelWeights weights;
-  for (int line = 0; line < lines; ++line) {
-    const auto off = [&](int i) { return step * (i - points / 2) - (line - (lines - 1) / 2.0) * pitch; };
-    double sum = 0;
-    for (int i = 0; i < points; ++i) sum += same_bits::bell(off(i), sigma);
-    for (int i = 0; i < points; ++i) {
-      weights.load.push_back(same_bits::bell(off(i), sigma) / sum);
-      weights.lean.push_back(weights.load.back() * (off(i) / sigma));
-    }
-  }
-  return weights;
-}
-
 std::uint64_t pass_stream(const Plate& plate, const PassSettings& pass) {
   return stream_of(plate.name() + "/" + std::to_string(pass.trial) + "/" + std::to_string(pass.pass) + "/" +
                    std::to_string(static_cast<long long>(pass.speed_mm_s * 1000)));
 }
 
 }  // namespace
+
+TaxelWeights::TaxelWeights(int lines, double pitch, int places, double first, double step, double bell,
+                           double sigma, double taxel) {
+  const int points = taxel > 0 ? kPointsOfATaxel : 1;
+  for (int line = 0; line < lines; ++line) {
+    const double at = (line - (lines - 1) / 2.0) * pitch;
+    std::vector<double> own(static_cast<std::size_t>(places));
+    double sum = 0;
+    for (int i = 0; i < places; ++i) {
+      double& weight = own[static_cast<std::size_t>(i)];
+      for (int p = 0; p < points; ++p)
+        weight += same_bits::bell(first + i * step - at - taxel * ((p + 0.5) / points - 0.5), bell);
+      sum += weight;
+    }
+    for (int i = 0; i < places; ++i) {
+      load.push_back(own[static_cast<std::size_t>(i)] / sum);
+      lean.push_back(load.back() * (first + i * step - at) / sigma);
+    }
+  }
+}
+
+std::vector<double> felt(const TaxelArray& array, std::span<const double> pressed, std::size_t across_step,
+                         std::size_t along_step, const std::vector<double>& across_weights,
+                         const std::vector<double>& along_weights) {
+  const auto rows = static_cast<std::size_t>(array.rows), columns = static_cast<std::size_t>(array.columns),
+             across = across_weights.size() / columns, along = along_weights.size() / rows;
+  std::vector<double> felt;
+  for (std::size_t row = 0; row < rows; ++row) {
+    std::vector<double> line(across);
+    for (std::size_t j = 0; j < along; ++j)
+      if (const double weight = along_weights[row * along + j]; weight != 0)  // a bell ends
+        for (std::size_t i = 0; i < across; ++i)
+          line[i] += weight * pressed[i * across_step + j * along_step];
+    for (auto weights = across_weights.begin(); weights != across_weights.end();
+         weights += static_cast<std::ptrdiff_t>(across))
+      felt.push_back(std::inner_product(line.begin(), line.end(), weights, 0.0));
+  }
+  return felt;
+}
 
 FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const PassSettings& of_pass,
                          std::uint64_t seed)
@@ -118,8 +146,9 @@ void FingerModel::shape_pad(double slope_x, double slope_y) {
   // Of a dome no more touches where the array is larger.
   if (settings_.body.shape == BodyShape::flat)
     settings_.mount_stiffness *= points(settings_.array) / points(TaxelArray{});
-  across_weights_ = taxel_weights(columns, pitch.x, across_, kAcrossMm, sigma);
-  along_weights_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma);
+  across_weights_ =
+      TaxelWeights(columns, pitch.x, across_, -kAcrossMm * (across_ / 2), kAcrossMm, sigma, sigma);
+  along_weights_ = TaxelWeights(rows, pitch.y, along_, -kAlongMm * (along_ / 2), kAlongMm, sigma, sigma);
   double lowest = 0;
   for (int i = 0; i < across_; ++i)
     for (int j = 0; j < along_; ++j) {
@@ -165,35 +194,19 @@ std::vector<double> FingerModel::indented(const FingerPose& pose) const {
     last_slope = slope;
     lift += excess / slope;
   }
-  for (double& d : depth) d -= lift;
+  for (double& d : depth) d = std::max(0.0, d - lift);
   return depth;
-}
-
-std::vector<double> FingerModel::felt(const std::vector<double>& indented,
-                                      const std::vector<double>& across_weight,
-                                      const std::vector<double>& along_weight) const {
-  const auto across = static_cast<std::size_t>(across_), along = static_cast<std::size_t>(along_);
-  const auto columns = static_cast<std::size_t>(settings_.array.columns);
-  std::vector<double> load(gain_.size()), rows(static_cast<std::size_t>(settings_.array.rows));
-  for (std::size_t i = 0; i < across; ++i) {
-    std::fill(rows.begin(), rows.end(), 0.0);
-    for (std::size_t j = 0; j < along; ++j) {
-      const double depth = indented[i * along + j];
-      if (depth <= 0) continue;
-      for (std::size_t row = 0; row < rows.size(); ++row) rows[row] += along_weight[row * along + j] * depth;
-    }
-    for (std::size_t k = 0; k < load.size(); ++k)
-      load[k] += across_weight[k % columns * across + i] * rows[k / columns];
-  }
-  return load;
 }
 
 std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) const {
   FingerPose shaken = pose;
   shaken.z_mm +=
       settings_.vibration_mm * same_bits::rough_sine(settings_.vibration_hz * time_s + vibration_phase_);
-  const std::vector<double> depth = indented(shaken),
-                            load = felt(depth, across_weights_.load, along_weights_.load);
+  const std::vector<double> depth = indented(shaken);
+  const auto felt_by = [&](const std::vector<double>& across, const std::vector<double>& along) {
+    return felt(settings_.array, depth, static_cast<std::size_t>(along_), 1, across, along);
+  };
+  const std::vector<double> load = felt_by(across_weights_.load, along_weights_.load);
   const double emi = settings_.emi_volts * same_bits::rough_sine(settings_.emi_hz * time_s + emi_phase_);
   const auto channels = static_cast<std::size_t>(settings_.array.channels);
   std::vector<double> volts(load.size() * channels);
@@ -203,8 +216,8 @@ std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) co
   for (std::size_t k = 0; k < load.size(); ++k)
     volts[k * channels + channels - 1] = disturbed(k, std::max(0.0, load[k] - threshold_[k]));
   if (channels == 3) {
-    const std::vector<double> lean_x = felt(depth, across_weights_.lean, along_weights_.load),
-                              lean_y = felt(depth, across_weights_.load, along_weights_.lean);
+    const std::vector<double> lean_x = felt_by(across_weights_.lean, along_weights_.load),
+                              lean_y = felt_by(across_weights_.load, along_weights_.lean);
     for (std::size_t k = 0; k < load.size(); ++k) {
       volts[3 * k] = disturbed(k, lean_x[k]) - kMiddleVolts;
       volts[3 * k + 1] = disturbed(k, lean_y[k] - kFriction * load[k]) - kMiddleVolts;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -58,11 +59,23 @@ struct PassSettings {
   double from_mm = 0, to_mm = rig::kPlateLengthMm;  ///< the slide, of the finger's centre
 };
 
-/// Weights of the pad's places for the columns or rows of taxels, [lines][places]: a bell, each line of which
-/// sums to 1, and the same times how many sigmas the place lies from the line, which sums to a load's lean.
+/// Weights of places for the columns or rows of taxels, [lines][places]: a bell, averaged over a taxel's
+/// side, each line of which sums to 1; and the same times how many sigmas the place lies from the line, which
+/// sums to a load's lean.
 struct TaxelWeights {
   std::vector<double> load, lean;
+
+  TaxelWeights() = default;
+  /// Lengths in mm: lines `pitch` apart, places `step` apart from `first` on, from the array's centre.
+  TaxelWeights(int lines, double pitch, int places, double first, double step, double bell, double sigma,
+               double taxel = 0);
 };
+
+/// The sum of what presses the places, weighted for each taxel [rows][columns] of an array: place (i, j)
+/// across and along is pressed[i * across_step + j * along_step], 0 or more.
+std::vector<double> felt(const TaxelArray& array, std::span<const double> pressed, std::size_t across_step,
+                         std::size_t along_step, const std::vector<double>& across_weights,
+                         const std::vector<double>& along_weights);
 
 /// The finger's voltages over a plate, one per taxel: contact of an elastic pad on a yielding mount, then the
 /// sensor. A pure function of pose and time, used alike by the simulator and by the virtual rig. Lengths,
@@ -97,9 +110,7 @@ class FingerModel {
 
  private:
   double surface(double x_mm, double y_mm) const;
-  std::vector<double> indented(const FingerPose& pose) const;  // d(u), negative where nothing touches
-  std::vector<double> felt(const std::vector<double>& indented, const std::vector<double>& across_weight,
-                           const std::vector<double>& along_weight) const;
+  std::vector<double> indented(const FingerPose& pose) const;  // d(u), [across][along]
   void shape_pad(double slope_x, double slope_y);
 
   SimulatorSettings settings_;
