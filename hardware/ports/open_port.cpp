@@ -41,11 +41,7 @@ class DescriptorPort : public Port {
 
   Received read(std::span<std::byte> buffer, double until) override {
     do {
-      const auto wait_ms = std::clamp(std::ceil(1e3 * (until - now())), 0.0, 1e9);
-      pollfd entry{descriptor_, POLLIN, 0};
-      const int ready = poll(&entry, 1, static_cast<int>(wait_ms));
-      if (ready < 0 && errno != EINTR) gone(strerror(errno));
-      if (ready <= 0) continue;
+      if (!wait_for(descriptor_, POLLIN, until - now())) continue;
       // A line's end is added to a datagram, and must fit.
       const bool lines = kind_ == Kind::lines;
       const ssize_t count = ::read(descriptor_, buffer.data(), buffer.size() - (lines ? 1 : 0));

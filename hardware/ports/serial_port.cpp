@@ -70,6 +70,11 @@ int set_raw_terminal(int descriptor, unsigned baud) {
   return ioctl(descriptor, TCSETS2, &settings) == 0 ? 0 : errno;
 }
 
+bool wait_for(int descriptor, short events, double seconds) {
+  pollfd entry{descriptor, events, 0};
+  return poll(&entry, 1, static_cast<int>(std::clamp(std::ceil(1e3 * seconds), 0.0, 1e9))) > 0;
+}
+
 double monotonic_seconds() { return seconds_of(CLOCK_MONOTONIC); }
 
 SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
@@ -117,7 +122,8 @@ Received SerialPort::read(std::span<std::byte> buffer, double until) {
     if (count == 0) unplugged("end of file");
     if (errno == EINTR) continue;
     if (errno != EAGAIN) unplugged(strerror(errno));
-    if (!wait_for(POLLIN, until)) return {0, now()};
+    if (now() >= until) return {0, now()};
+    (void)wait_for(descriptor_, POLLIN, (until - now()) / speedup_);
   }
 }
 
@@ -130,29 +136,13 @@ double SerialPort::write(std::span<const std::byte> bytes, double until) {
     }
     if (count < 0 && errno == EINTR) continue;
     if (count < 0 && errno != EAGAIN) unplugged(strerror(errno));
-    if (!wait_for(POLLOUT, until)) {
+    if (now() >= until) {
       throw PortTimeout("port " + path_ + ": the device took no bytes before the deadline (" +
                         std::to_string(bytes.size()) + " left); switch it off and on again");
     }
+    (void)wait_for(descriptor_, POLLOUT, (until - now()) / speedup_);
   }
   return now();
-}
-
-bool SerialPort::wait_for(short events, double until) {
-  for (;;) {
-    const double wait_ms = std::max(0.0, 1e3 * (until - now()) / speedup_);
-    pollfd entry{descriptor_, events, 0};
-    const int ready = poll(&entry, 1, static_cast<int>(std::min(std::ceil(wait_ms), 1e9)));
-    if (ready < 0 && errno != EINTR) unplugged(strerror(errno));
-    if (ready > 0 && (entry.revents & events) != 0 && (entry.revents & POLLHUP) == 0) return true;
-    if (ready > 0 && (entry.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) {
-      // Bytes that arrived before the plug was pulled are still readable; then the next read ends here again.
-      int left = 0;
-      if (events == POLLIN && ioctl(descriptor_, FIONREAD, &left) == 0 && left > 0) return true;
-      unplugged("end of file");
-    }
-    if (now() >= until) return false;
-  }
 }
 
 void SerialPort::unplugged(const std::string& found) const {

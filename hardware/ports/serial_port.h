@@ -16,6 +16,10 @@ namespace supertac {
 /// Seconds of CLOCK_MONOTONIC.
 double monotonic_seconds();
 
+/// Waits until a descriptor is ready for `events` of poll(), or its other side has gone: the next read or
+/// write says which. False when `seconds` passed or a signal came first.
+bool wait_for(int descriptor, short events, double seconds);
+
 struct SerialSettings {
   unsigned baud = rig::kPrinterBaud;
   /// The port's clock runs this many times faster than the wall clock. 1 for everything real; a virtual rig
@@ -41,8 +45,6 @@ class SerialPort : public Port {
   double write(std::span<const std::byte> bytes, double until) override;
 
  private:
-  /// Waits for `events`; false when `until` passed. Throws PortUnplugged on POLLHUP without data.
-  bool wait_for(short events, double until);
   [[noreturn]] void unplugged(const std::string& found) const;
 
   std::string path_, lasting_;  // lasting_: the name that it has wherever it is plugged in

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <initializer_list>
 #include <stdexcept>
@@ -25,32 +24,25 @@ bool contains_one(std::string_view text, std::initializer_list<std::string_view>
 std::optional<std::int64_t> number_after(std::string_view text, std::string_view label) {
   const std::size_t at = text.find(label);
   if (at == std::string_view::npos) return std::nullopt;
-  std::string_view rest = text.substr(at + label.size());
-  while (!rest.empty() && rest.front() == ' ') rest.remove_prefix(1);
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
-  const bool ends_cleanly = end == rest.data() + rest.size() || *end == ' ';
-  if (error != std::errc{} || !ends_cleanly) return std::nullopt;
-  return value;
+  const std::string_view rest = trimmed(text.substr(at + label.size()));
+  return parse_int(rest.substr(0, rest.find(' ')));
 }
 
 // "X:99.70 Y:101.17 Z:91.81 E:0.00 Count ...": all three, or the line counts as damaged.
 std::optional<Point3> position_in(std::string_view text) {
-  if (!text.starts_with("X:")) return std::nullopt;
+  const std::vector<std::string_view> words = split_line(text, ' ');
   std::array<double, 3> values{};
-  constexpr std::array<std::string_view, 3> kLabels{"X:", " Y:", " Z:"};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::size_t at = text.find(kLabels[axis]);
-    if (at == std::string_view::npos) return std::nullopt;
-    const char* first = text.data() + at + kLabels[axis].size();
-    const char* last = text.data() + text.size();
-    const auto [end, error] = std::from_chars(first, last, values[axis], std::chars_format::fixed);
+  for (std::size_t axis = 0; axis < values.size(); ++axis) {
+    constexpr std::string_view kLabels[] = {"X:", "Y:", "Z:"};
+    if (axis >= words.size() || !words[axis].starts_with(kLabels[axis])) return std::nullopt;
+    const std::string_view number = words[axis].substr(kLabels[axis].size());
+    const std::optional<double> value = parse_double(number);
     // Two decimals at least: a lost point or digit would otherwise move the head by metres.
-    const std::string_view number(first, static_cast<std::size_t>(end - first));
     const std::size_t point = number.find('.');
-    if (error != std::errc{} || point == std::string_view::npos || number.size() - point < 3)
+    if (!value || point == std::string_view::npos || number.size() - point < 3 ||
+        number.find_first_of("eE") != std::string_view::npos)
       return std::nullopt;
-    if (end != last && *end != ' ') return std::nullopt;
+    values[axis] = *value;
   }
   return Point3{values[0], values[1], values[2]};
 }

@@ -86,7 +86,11 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
   const auto usable = [](double value) { return value > 0 && std::isfinite(value); };
   if (plan.passes < 1 || plan.passes > kMostPasses || !usable(plan.slide) || !usable(plan.lift) ||
       !usable(plan.speed)) {
-    throw std::invalid_argument("palpation: expected 1 to 1000 passes, and slide, lift and speed above 0");
+    throw std::invalid_argument("palpation: expected 1 to " + std::to_string(kMostPasses) +
+                                " passes, and slide, lift and speed above 0, got " +
+                                std::to_string(plan.passes) + " passes, a slide of " + format(plan.slide) +
+                                " mm, a lift of " + format(plan.lift) + " mm and " + format(plan.speed) +
+                                " mm/s");
   }
   std::vector<Leg> legs;
   Point3 at = here;
