@@ -85,12 +85,6 @@ void write_checkpoint(const OutputPath& output, const std::vector<Parameter>& pa
   write_safetensors(output, std::move(metadata), list);
 }
 
-SafetensorsFile read_checkpoint(const std::string& path) {
-  SafetensorsFile file = SafetensorsFile::read(path);
-  check_checkpoint(file);
-  return file;
-}
-
 void check_checkpoint(const SafetensorsFile& file) {
   const std::string& path = file.path();
   const auto format = file.metadata().find("format");
@@ -107,8 +101,7 @@ void check_checkpoint(const SafetensorsFile& file) {
   }
 }
 
-void load_parameters(const SafetensorsFile& file, const std::string& path,
-                     const std::vector<Parameter>& parameters,
+void load_parameters(const SafetensorsFile& file, const std::vector<Parameter>& parameters,
                      std::initializer_list<std::string_view> beside) {
   std::vector<std::string> problems;
   std::set<std::string> known;
@@ -125,7 +118,8 @@ void load_parameters(const SafetensorsFile& file, const std::string& path,
   }
   if (!problems.empty()) {
     throw std::runtime_error(
-        path + ": the tensors do not fit the model that its metadata describes: " + joined(problems, "; "));
+        file.path() +
+        ": the tensors do not fit the model that its metadata describes: " + joined(problems, "; "));
   }
   for (const Parameter& p : parameters) {
     Variable handle = p.value;
@@ -134,10 +128,9 @@ void load_parameters(const SafetensorsFile& file, const std::string& path,
   }
 }
 
-Tensor load_like(const SafetensorsFile& file, const std::string& path, const std::string& name,
-                 const Parameter& parameter) {
+Tensor load_like(const SafetensorsFile& file, const std::string& name, const Parameter& parameter) {
   if (std::string problem = mismatch(file, name, parameter); !problem.empty())
-    throw std::runtime_error(path + ": " + problem);
+    throw std::runtime_error(file.path() + ": " + problem);
   return to_memory(file.f32(name), parameter);
 }
 

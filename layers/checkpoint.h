@@ -32,21 +32,18 @@ void write_checkpoint(const OutputPath& output, const std::vector<Parameter>& pa
                       std::map<std::string, std::string> metadata,
                       const std::vector<StoredTensor>& more = {});
 
-/// Reads and checks format and version. Throws std::runtime_error naming path, expected and found.
-SafetensorsFile read_checkpoint(const std::string& path);
-/// The same of a file that has been read.
+/// Throws std::runtime_error naming path, expected and found unless it is a checkpoint that this version
+/// reads.
 void check_checkpoint(const SafetensorsFile& file);
 
 /// Fills the parameters from the file. Other tensors are allowed when their names begin with one of `beside`.
 /// Throws std::runtime_error that lists every missing, unexpected and mismatching tensor at once; then
 /// nothing has been changed.
-void load_parameters(const SafetensorsFile& file, const std::string& path,
-                     const std::vector<Parameter>& parameters,
+void load_parameters(const SafetensorsFile& file, const std::vector<Parameter>& parameters,
                      std::initializer_list<std::string_view> beside = {});
 
 /// Reads one array stored by to_stored() for that parameter into a tensor in the memory layout.
 /// Throws std::runtime_error when it is missing or of another shape or type.
-Tensor load_like(const SafetensorsFile& file, const std::string& path, const std::string& name,
-                 const Parameter& parameter);
+Tensor load_like(const SafetensorsFile& file, const std::string& name, const Parameter& parameter);
 
 }  // namespace supertac

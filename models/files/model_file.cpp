@@ -69,27 +69,26 @@ InputSettings read_input(JsonObject entry) {
 }
 
 // Older versions trained networks of single frames on files of pairs.
-void refuse_other_kinds(const SafetensorsFile& file, const std::string& path) {
+void refuse_other_kinds(const SafetensorsFile& file) {
   const auto kind = file.metadata().find("kind");
   if (kind == file.metadata().end()) return;
   if (kind->second != "frame-checkpoint")
-    throw std::runtime_error(path + ": expected a model, found kind " + in_quotes(kind->second));
+    throw std::runtime_error(file.path() + ": expected a model, found kind " + in_quotes(kind->second));
   throw std::runtime_error(
-      path +
+      file.path() +
       ": is a frame model of supertac-train --pairs, which is gone; turn its pairs into recordings "
       "(supertac-import FILE.safetensors --out DIR) and train again (supertac-train --data DIR --preset "
       "frame)");
 }
 
-std::unique_ptr<SuperTac> build(const SuperTacSettings& settings, const SafetensorsFile& file,
-                                const std::string& path) {
+std::unique_ptr<SuperTac> build(const SuperTacSettings& settings, const SafetensorsFile& file) {
   Rng rng = Rng::zeros();
   auto model = std::make_unique<SuperTac>(settings, rng);
-  load_parameters(file, path, model->parameters(), {"optimizer.", "novelty.", "int8."});
+  load_parameters(file, model->parameters(), {"optimizer.", "novelty.", "int8."});
   for (const Parameter& parameter : model->parameters())
     if (!std::ranges::all_of(parameter.value.value().values(), [](real v) { return std::isfinite(v); }))
       throw std::runtime_error(
-          path + ": " + in_quotes(parameter.name) +
+          file.path() + ": " + in_quotes(parameter.name) +
           " holds NaN or infinity: its training diverged, or it is damaged; choose another model");
   return model;
 }
@@ -172,7 +171,7 @@ ModelFile load_model(const std::string& path) { return model_of(SafetensorsFile:
 ModelFile model_of(const SafetensorsFile& file) {
   const std::string& path = file.path();
   check_checkpoint(file);
-  refuse_other_kinds(file, path);
+  refuse_other_kinds(file);
   const SuperTacSettings settings = read_settings({file.metadata(), path, "settings"});
   ModelFile loaded;
   loaded.metadata = file.metadata();
@@ -180,11 +179,11 @@ ModelFile model_of(const SafetensorsFile& file) {
   if (settings.timesteps == 1 && loaded.input.scaling.per_window)
     throw std::runtime_error(path +
                              ": input: a single frame has no rest and gain of its own, found levelled");
-  loaded.model = build(settings, file, path);
+  loaded.model = build(settings, file);
   loaded.novelty = Novelty::read(
-      file, path,
+      file,
       signal_feature_count(loaded.array(), static_cast<std::size_t>(loaded.model->settings().timesteps)));
-  loaded.ranges = ActivationRanges::read(file, path);
+  loaded.ranges = ActivationRanges::read(file);
   return loaded;
 }
 

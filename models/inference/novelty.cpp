@@ -174,14 +174,13 @@ std::vector<StoredTensor> Novelty::stored() const {
   return {{kMean, {d}, mean_}, {kWhitening, {d, d}, whitening_}, {kLimit, {1}, {limit_}}};
 }
 
-std::optional<Novelty> Novelty::read(const SafetensorsFile& file, const std::string& path,
-                                     std::size_t features) {
+std::optional<Novelty> Novelty::read(const SafetensorsFile& file, std::size_t features) {
   if (!file.tensors().contains(kLimit)) return std::nullopt;
   const std::uint64_t d = features;
   const auto tensor = [&](const char* name, const std::vector<std::uint64_t>& shape) {
     const auto found = file.tensors().find(name);
     if (found == file.tensors().end() || found->second.shape != shape)
-      throw std::runtime_error(path + ": the tensor " + name + " does not fit a model of " +
+      throw std::runtime_error(file.path() + ": the tensor " + name + " does not fit a model of " +
                                std::to_string(d) + " features; train it again");
     return file.f32(name);
   };

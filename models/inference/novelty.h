@@ -42,8 +42,7 @@ class Novelty {
   explicit Novelty(const Tensor& features);
   /// As stored() wrote it; empty for a file without. Throws std::runtime_error naming path and tensor when
   /// the shapes are not those of so many features.
-  static std::optional<Novelty> read(const SafetensorsFile& file, const std::string& path,
-                                     std::size_t features);
+  static std::optional<Novelty> read(const SafetensorsFile& file, std::size_t features);
   std::vector<StoredTensor> stored() const;
 
   /// Of features [D]. Throws std::invalid_argument for another number of them.

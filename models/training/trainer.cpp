@@ -87,8 +87,6 @@ Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, con
   for (Dim i = first; i < first + micro_batches / ranks.size(); ++i)
     micro_batches_.emplace_back(model_, noise, i * n / micro_batches,
                                 (i + 1) * n / micro_batches - i * n / micro_batches);
-  for (const MicroBatch& micro_batch : micro_batches_)
-    micro_batch_parameters_.push_back(&micro_batch.network.parameters());
 }
 
 Trainer::MicroBatch::MicroBatch(const SuperTac& master, Dim noise, Dim first_sample, Dim count)
@@ -195,7 +193,7 @@ StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMi
       if (!around) {
         run(micro_batch);
       } else {
-        around(i, micro_batch.batch, *micro_batch_parameters_[i], [&] { run(micro_batch); });
+        around(i, micro_batch.batch, micro_batch.network.parameters(), [&] { run(micro_batch); });
       }
     } catch (...) {  // an exception must not leave a thread
       micro_batches_[i].error = std::current_exception();
@@ -282,17 +280,16 @@ void Trainer::add_up_over_ranks() {
 // clipping. Throws TrainingStopped when it is not finite; parameters, moments and step are as they were.
 double Trainer::apply() {
   const std::vector<Parameter>& parameters = model().parameters();
-  const auto& micro_batches = micro_batch_parameters_;
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     std::array<const real*, kMostMicroBatches> parts;
-    for (std::size_t micro_batch = 0; micro_batch < micro_batches.size(); ++micro_batch)
-      parts[micro_batch] = (*micro_batches[micro_batch])[i].value.grad().data();
+    for (std::size_t k = 0; k < micro_batches_.size(); ++k)
+      parts[k] = micro_batches_[k].network.parameters()[i].value.grad().data();
     Tensor& sum = Variable(parameters[i].value).mutable_grad();
     if (parts[0] == nullptr) {  // the loss does not depend on it
       sum.fill(0);
     } else {
-      add_as_tree(sum.size(), std::span(parts).first(micro_batches.size()), sum.data());
+      add_as_tree(sum.size(), std::span(parts).first(micro_batches_.size()), sum.data());
     }
   }
   if (ranks_.size() > 1) add_up_over_ranks();

@@ -173,9 +173,8 @@ class Trainer {
   std::int64_t best_epoch_ = 0, epochs_since_best_ = 0;
   std::vector<real> sum_, of_partner_sum_;  // all gradients in one piece, of several processes
   std::vector<double> of_partner_;
-  std::vector<std::uint32_t> indices_;                                 // of the batch
-  std::vector<MicroBatch> micro_batches_;                              // of this process
-  std::vector<const std::vector<Parameter>*> micro_batch_parameters_;  // of these models
+  std::vector<std::uint32_t> indices_;     // of the batch
+  std::vector<MicroBatch> micro_batches_;  // of this process
 };
 
 }  // namespace supertac

@@ -13,12 +13,11 @@ namespace {
 
 void copy_into(Tensor& to, const Tensor& from) { std::copy_n(from.data(), from.size(), to.data()); }
 
-void expect_same(const SafetensorsFile& file, const std::string& path,
-                 const std::map<std::string, std::string>& expected) {
+void expect_same(const SafetensorsFile& file, const std::map<std::string, std::string>& expected) {
   for (const auto& [key, value] : expected) {
     const auto found = file.metadata().find(key);
     if (found != file.metadata().end() && found->second == value) continue;
-    throw std::runtime_error(path + ": cannot resume: its " + key + " is " +
+    throw std::runtime_error(file.path() + ": cannot resume: its " + key + " is " +
                              (found == file.metadata().end() ? "missing" : found->second) +
                              ", this run's is " + value +
                              "; give the same options and data, or start anew without --resume");
@@ -77,8 +76,9 @@ void Trainer::save(const std::string& path, std::map<std::string, std::string> o
 }
 
 void Trainer::restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata) {
-  const SafetensorsFile file = read_checkpoint(path);
-  expect_same(file, path, metadata(expected_metadata));
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  check_checkpoint(file);
+  expect_same(file, metadata(expected_metadata));
   const auto integer = [&](const char* key) {
     const auto value = parse_int(value_or(file.metadata(), key));
     if (!value || *value < 0 || *value > total_steps()) {
@@ -90,14 +90,14 @@ void Trainer::restore(const std::string& path, const std::map<std::string, std::
   const std::int64_t step = integer("step"), flat_steps = integer("flat_steps");
   const std::vector<Moments> moments = this->moments();
   std::vector<Tensor> loaded, best;
-  for (const Moments& m : moments) loaded.push_back(load_like(file, path, m.name, m.parameter));
+  for (const Moments& m : moments) loaded.push_back(load_like(file, m.name, m.parameter));
   std::int64_t best_epoch = 0, since_best = 0;
   if (file.metadata().contains("best_epoch")) {
     best_epoch = integer("best_epoch"), since_best = integer("epochs_since_best");
     for (const Parameter& p : model().parameters())
-      best.push_back(load_like(file, path, "optimizer.best." + p.name, p));
+      best.push_back(load_like(file, "optimizer.best." + p.name, p));
   }
-  load_parameters(file, path, model().parameters(), {"optimizer."});
+  load_parameters(file, model().parameters(), {"optimizer."});
   best_ = std::move(best), best_epoch_ = best_epoch, epochs_since_best_ = since_best;
   best_score_ = parse_double(value_or(file.metadata(), "best_score")).value_or(0);
   for (std::size_t i = 0; i < moments.size(); ++i) copy_into(moments[i].values, loaded[i]);

@@ -51,7 +51,7 @@ TEST(MiniSuperTac, HasTheProjectsLossesAndPicture) {
   const SuperTac model(SuperTacSettings::of_preset("tiny"), rng);
   const std::string path = testing::TempDir() + "mini_" + std::to_string(sizeof(real)) + ".safetensors";
   write_checkpoint(path, model.parameters(), {});
-  load_parameters(read_checkpoint(path), path, model.parameters());
+  load_parameters(SafetensorsFile::read(path), model.parameters());
   weights.clear();
   load(path);
   std::remove(path.c_str());

@@ -22,9 +22,9 @@ TEST_F(CheckpointTest, ComesBackToTheBit) {
   Rng a(1), b(2);
   const Conv2d written(3, 5, {}, a), read(3, 5, {}, b);
   write_checkpoint(path("c.safetensors"), written.parameters(), {{"note", "x"}});
-  const SafetensorsFile file = read_checkpoint(path("c.safetensors"));
+  const SafetensorsFile file = SafetensorsFile::read(path("c.safetensors"));
   EXPECT_EQ(file.metadata().at("note"), "x");
-  load_parameters(file, path("c.safetensors"), read.parameters());
+  load_parameters(file, read.parameters());
   for (std::size_t i = 0; i < 2; ++i) {
     const auto x = written.parameters()[i].value.value().values(),
                y = read.parameters()[i].value.value().values();
@@ -43,10 +43,11 @@ TEST_F(CheckpointTest, ListsEveryProblemAtOnceAndChangesNothing) {
   Variable fine = wanted[0].value;
   fine.mutable_value().fill(7);
   EXPECT_EQ(what_of<std::runtime_error>([&] {
-              load_parameters(read_checkpoint(path("c.safetensors")), "c", wanted, {"optimizer."});
+              load_parameters(SafetensorsFile::read(path("c.safetensors")), wanted, {"optimizer."});
             }),
-            "c: the tensors do not fit the model that its metadata describes: "
-            "shape expected F32 [3,3], found F32 [3,2]; missing absent; unexpected extra");
+            path("c.safetensors") +
+                ": the tensors do not fit the model that its metadata describes: "
+                "shape expected F32 [3,3], found F32 [3,2]; missing absent; unexpected extra");
   EXPECT_EQ(fine.value().data()[0], 7);
 }
 
@@ -66,7 +67,8 @@ TEST_F(CheckpointTest, RefusesOtherFilesAndNewerVersions) {
                       {{"a", "F32", {1}, std::as_bytes(std::span(one))}});
   };
   const auto message = [&] {
-    return what_of<std::runtime_error>([&] { read_checkpoint(path("c.safetensors")); });
+    return what_of<std::runtime_error>(
+        [&] { check_checkpoint(SafetensorsFile::read(path("c.safetensors"))); });
   };
   write({{"format", "supertac-recording"}});
   EXPECT_NE(message().find("not a SuperTac checkpoint"), std::string::npos) << message();

@@ -33,7 +33,7 @@ class ActivationRanges {
   /// and std::invalid_argument for a network of another number of ops.
   void add(const SuperTac& network, const Tensor& inputs);
   /// As stored() wrote it; empty for a file without. Throws std::runtime_error naming path and tensor.
-  static std::optional<ActivationRanges> read(const SafetensorsFile& file, const std::string& path);
+  static std::optional<ActivationRanges> read(const SafetensorsFile& file);
   StoredTensor stored() const;
 
   std::size_t ops() const { return low_.size(); }

@@ -24,18 +24,18 @@ void ActivationRanges::add(const SuperTac& network, const Tensor& inputs) {
   }
 }
 
-std::optional<ActivationRanges> ActivationRanges::read(const SafetensorsFile& file, const std::string& path) {
+std::optional<ActivationRanges> ActivationRanges::read(const SafetensorsFile& file) {
   const auto found = file.tensors().find(kName);
   if (found == file.tensors().end()) return {};
   const TensorInfo& info = found->second;
   if (info.dtype != "F32" || info.shape.size() != 2 || info.shape[1] != 2)
-    throw std::runtime_error(path + ": " + kName + " expected F32 [N,2], found " + info.dtype + " " +
+    throw std::runtime_error(file.path() + ": " + kName + " expected F32 [N,2], found " + info.dtype + " " +
                              shape_text(info.shape));
   ActivationRanges ranges;
   const std::vector<float> values = file.f32(kName);
   for (std::size_t i = 0; i + 1 < values.size(); i += 2) {
     if (!(values[i] <= 0 && values[i + 1] >= 0 && std::isfinite(values[i + 1] - values[i])))
-      throw std::runtime_error(path + ": " + kName + " expected finite ranges around 0, found " +
+      throw std::runtime_error(file.path() + ": " + kName + " expected finite ranges around 0, found " +
                                format(values[i]) + " to " + format(values[i + 1]));
     ranges.low_.push_back(values[i]);
     ranges.high_.push_back(values[i + 1]);

@@ -44,15 +44,15 @@ TEST(Novelty, TravelsInTheModelFile) {
   const std::string path = folder / "m.safetensors";
   const Novelty novelty(plane(100));
   write_checkpoint(path, {}, {}, novelty.stored());
-  const auto back = Novelty::read(read_checkpoint(path), path, 3);
+  const auto back = Novelty::read(SafetensorsFile::read(path), 3);
   ASSERT_TRUE(back);
   const real z[] = {1, 0, 2};
   EXPECT_EQ(back->distance(z), novelty.distance(z));
   EXPECT_EQ(back->limit(), novelty.limit());
-  EXPECT_EQ(what_of<std::runtime_error>([&] { Novelty::read(read_checkpoint(path), path, 4); }),
+  EXPECT_EQ(what_of<std::runtime_error>([&] { Novelty::read(SafetensorsFile::read(path), 4); }),
             path + ": the tensor novelty.mean does not fit a model of 4 features; train it again");
   write_checkpoint(path, {}, {});
-  EXPECT_FALSE(Novelty::read(read_checkpoint(path), path, 3));
+  EXPECT_FALSE(Novelty::read(SafetensorsFile::read(path), 3));
 }
 
 TEST(Novelty, RefusesTooFewFeatures) {

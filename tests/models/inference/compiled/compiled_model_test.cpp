@@ -142,18 +142,19 @@ TEST(CompiledModel, RefusesRangesThatAreNotFiniteOrNoPairs) {
     const std::array<float, 4> ranges{0, 1, -1, high};  // write_checkpoint() would refuse the same itself
     write_safetensors(folder / "m.safetensors", {},
                       {{"int8.ranges", "F32", {2, 2}, std::as_bytes(std::span(ranges))}});
-    return ActivationRanges::read(SafetensorsFile::read(folder / "m.safetensors"), "m");
+    return ActivationRanges::read(SafetensorsFile::read(folder / "m.safetensors"));
   };
   EXPECT_EQ(read(2)->ops(), 2U);
   const std::pair<float, const char*> refused[] = {
       {-1.0F, "-1"}, {std::numeric_limits<float>::infinity(), "inf"}, {std::nanf(""), "nan"}};
   for (const auto& [high, found] : refused)
-    EXPECT_EQ(what_of<std::runtime_error>([&, &high = high] { read(high); }),
-              std::string("m: int8.ranges expected finite ranges around 0, found -1 to ") + found);
+    EXPECT_EQ(
+        what_of<std::runtime_error>([&, &high = high] { read(high); }),
+        folder / "m.safetensors" + ": int8.ranges expected finite ranges around 0, found -1 to " + found);
   write_checkpoint(folder / "flat.safetensors", {}, {}, {{"int8.ranges", {4}, {0, 1, -1, 2}}});
   EXPECT_EQ(what_of<std::runtime_error>(
-                [&] { ActivationRanges::read(SafetensorsFile::read(folder / "flat.safetensors"), "m"); }),
-            "m: int8.ranges expected F32 [N,2], found F32 [4]");
+                [&] { ActivationRanges::read(SafetensorsFile::read(folder / "flat.safetensors")); }),
+            folder / "flat.safetensors" + ": int8.ranges expected F32 [N,2], found F32 [4]");
 }
 
 // A warm training step and a warm inference, compiled or not, go to the heap not once.
