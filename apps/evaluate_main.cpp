@@ -104,7 +104,7 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
 Json result_of(const Arguments& a, const Ensemble& network, const WindowSet& windows, const TestSet& tested,
                const Baselines& baselines, const RecordingScores& scores) {
   Json result = scores.of_method.front().to_json();
-  result["felt"] = scores_by_distance(windows, scores.contact);
+  result["by_distance"] = scores_by_distance(windows, scores.contact);
   result["groups"] = scores_by_group(scores.by_group);
   result["trust"] = scores.trust.to_json();
   if (!scores.map.empty()) result["map"] = scores.map.to_json();

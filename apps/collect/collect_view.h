@@ -75,7 +75,7 @@ class CollectView {
                    {"width", kWidth},
                    {"length", kLength},
                    {"heights", levels_base64(heights)},
-                   {"map", colour_map_base64()},
+                   {"colours", colour_map_base64()},
                    {"passes", passes}});
   }
 

@@ -213,7 +213,7 @@ std::string evaluation_page(const Ensemble& network, const WindowSet& windows,
                       {"rows", windows.array().rows},
                       {"columns", windows.array().columns},
                       {"scale", windows.settings().scale},
-                      {"map", colour_map_base64()},
+                      {"colours", colour_map_base64()},
                       {"worst_of_groups", shown(of_groups, windows, network)},
                       {"worst", shown(extremes(windows, scores, false), windows, network)},
                       {"best", shown(extremes(windows, scores, true), windows, network)}});

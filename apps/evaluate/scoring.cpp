@@ -296,7 +296,7 @@ nlohmann::ordered_json MapScores::to_json() const {
     const Metrics contact = scored->zones.contact();
     json[name] = {{"ssim", contact.ssim},
                   {"psnr_mean_db", contact.psnr_mean_db},
-                  {"felt", scores_by_distance(windows_, scored->contact)},
+                  {"by_distance", scores_by_distance(windows_, scored->contact)},
                   {"over_passes", scores_by_pass(windows_, scored->contact)},
                   {"elements",
                    {{"existing", scored->elements.existing},

@@ -122,7 +122,7 @@ class MapScores {
   void finish();
 
   bool empty() const { return added_.empty(); }
-  /// {"of_pass": {"ssim", "psnr_mean_db", "felt": scores_by_distance(), "over_passes":
+  /// {"of_pass": {"ssim", "psnr_mean_db", "by_distance": scores_by_distance(), "over_passes":
   /// scores_by_pass(), "elements": {"existing", "found", "false", "median_mm", "pitch_error_mm"}},
   /// "of_surface": the same, "surfaces": {PLATE_tTRIAL: {"kind", "kind_share", "pitch_mm", "elements":
   /// [{"x_mm", "y_mm", ...}]}}, "passes": {PLATE_tTRIAL_pPASS: the same without "elements"}}

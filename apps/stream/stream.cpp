@@ -87,7 +87,7 @@ void Stream::open_page(const PictureFormat& recorded, const PictureFormat& forma
                           {"delay_s", maker_ ? maker_->delay_s() : 0},
                           {"silent", source_.silent()},
                           {"found", settings_.found},
-                          {"map", colour_map_base64()}};
+                          {"colours", colour_map_base64()}};
   web_ = std::make_unique<WebView>(
       *settings_.web, std::move(hello), [this](MapCells cells) { return named(std::move(cells)); },
       *recorder_, order_.get());

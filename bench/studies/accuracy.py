@@ -120,7 +120,7 @@ def of_surface(found):
     """And of one plate."""
     line = {"windows": found["contact"]["windows"], "position_error_mm": f"{found['contact']['position_error_mm']:.4f}"}
     for prefix, part in (("", found), ("map_", found["map"]["of_pass"])):
-        first = [one for one in part["felt"] if one["from_mm"] < 15]
+        first = [one for one in part["by_distance"] if one["from_mm"] < 15]
         line["first_15_mm_windows"] = sum(one["windows"] for one in first)
         line[prefix + "first_15_mm_ssim"] = f"{sum(one['ssim'] * one['windows'] for one in first) / line['first_15_mm_windows']:.4f}"
     for truth, held in found["trust"]["coverage_of"].items():

@@ -89,13 +89,13 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
   if (state.distance) event["distance"] = *state.distance, event["unlike"] = state.unlike_training;
   if (std::isfinite(state.x_mm)) event["x"] = state.x_mm, event["y"] = state.y_mm;
   if (const MapRegion& r = state.map.region; !r.empty()) {
-    std::vector<std::uint8_t> felt;
-    for (const float value : state.map.values) felt.push_back(std::isnan(value) ? 0 : 1);
+    std::vector<std::uint8_t> known;
+    for (const float value : state.map.values) known.push_back(std::isnan(value) ? 0 : 1);
     event["map"] = {{"left", r.left},
                     {"bottom", r.bottom},
                     {"width", r.width},
                     {"values", levels_base64(state.map.values)},
-                    {"felt", base64(felt)}};
+                    {"known", base64(known)}};
   }
   if (state.surface) {
     event["elements"] = {{"text", elements_text(*state.surface)}, {"rows", nlohmann::json::array()}};

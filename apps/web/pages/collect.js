@@ -4,7 +4,7 @@ let hello = null, newest = null, texture = null, ended = null, stopping = false;
 // The plate's heights as an image, y to the right.
 function textureOf(h) {
   const levels = bytes(h.heights), image = document.createElement("canvas");
-  return paint(image, bytes(h.map), h.width, h.length, (row, y) => levels[y * h.width + h.width - 1 - row]);
+  return paint(image, bytes(h.colours), h.width, h.length, (row, y) => levels[y * h.width + h.width - 1 - row]);
 }
 
 function draw() {

@@ -15,7 +15,7 @@ function prepared(canvas) {
 // levels [rows][columns], row 0 at the bottom, as an image of one dot each.
 const scratch = document.createElement("canvas");
 const image = (levels, rows, columns) =>
-    paint(scratch, supertac.hello.map, rows, columns, (r, c) => levels[(rows - 1 - r) * columns + c]);
+    paint(scratch, supertac.hello.colours, rows, columns, (r, c) => levels[(rows - 1 - r) * columns + c]);
 
 function hatch(g, wide, rows, columns, box) {
   g.save();
@@ -105,9 +105,9 @@ function ring(g, box, k, rows, columns) {
 
 // The colours from 0 to 1 and what the ends mean.
 function drawBar(g, w, [low, high], left = 30) {
-  const map = supertac.hello.map, width = w - left - 6;
+  const colours = supertac.hello.colours, width = w - left - 6;
   for (let i = 0; i < 256; ++i) {
-    g.fillStyle = `rgb(${map[3 * i]},${map[3 * i + 1]},${map[3 * i + 2]})`;
+    g.fillStyle = `rgb(${colours[3 * i]},${colours[3 * i + 1]},${colours[3 * i + 2]})`;
     g.fillRect(left + width * i / 256, 0, width / 256 + 1, 12);
   }
   g.fillStyle = style("--quiet");
@@ -125,7 +125,7 @@ const drawnEnds = (w) => w < 240 ? ["0", "highest"] : ["0", "1, the highest"];
 // values [column][row] up to `top`, oldest first, the newest at the right edge.
 function drawStrip(canvas, values, top, rows, labels, withTime) {
   const {g, w, h} = prepared(canvas), left = 30, bottom = withTime ? 18 : 0, height = h - bottom;
-  paint(scratch, supertac.hello.map, rows, COLUMNS, (r, c) => {
+  paint(scratch, supertac.hello.colours, rows, COLUMNS, (r, c) => {
     const time = strips.end - COLUMNS + 1 + c, slot = (time % COLUMNS + COLUMNS) % COLUMNS;
     if (strips.times[slot] !== time) return undefined;
     return Math.min(255, Math.round(255 * values[slot * rows + rows - 1 - r] / top));
@@ -153,7 +153,7 @@ function drawStrip(canvas, values, top, rows, labels, withTime) {
 
 function drawMap() {
   if (element("slide").hidden || surface.size === 0) return;
-  const canvas = element("map"), [mmX, mmY] = supertac.hello.pixel_mm, map = supertac.hello.map;
+  const canvas = element("map"), [mmX, mmY] = supertac.hello.pixel_mm, colours = supertac.hello.colours;
   const at = [...surface].map(([key, level]) => [...key.split(",").map(Number), level]);
   const ends = (k) => at.reduce(([low, high], one) => [Math.min(low, one[k]), Math.max(high, one[k] + 1)], [Infinity, -Infinity]);
   const [x0, x1] = ends(0), [y0, y1] = ends(1), left = 34, bottom = 32;
@@ -163,7 +163,7 @@ function drawMap() {
   const X = (y) => left + (y - y0) * mmY * unit, Y = (x) => 4 + (x1 - x) * mmX * unit;
   for (const [x, y, value] of at) {
     const level = 3 * value;
-    g.fillStyle = `rgb(${map[level]},${map[level + 1]},${map[level + 2]})`;
+    g.fillStyle = `rgb(${colours[level]},${colours[level + 1]},${colours[level + 2]})`;
     g.fillRect(X(y), Y(x + 1), mmY * unit + 1, mmX * unit + 1);
   }
   g.fillStyle = style("--quiet");

@@ -33,16 +33,16 @@ function remember(event) {
 
 // The surface that was felt: the level of each cell, by its place. The program sends what has changed.
 const surface = new Map();
-function mend({left, bottom, width, values, felt: mask}) {
-  const levels = bytes(values), known = bytes(mask);
+function mend({left, bottom, width, values, known}) {
+  const levels = bytes(values), isKnown = bytes(known);
   for (let i = 0; i < levels.length; ++i)
-    if (known[i]) surface.set(`${left + i % width},${bottom + Math.floor(i / width)}`, levels[i]);
+    if (isKnown[i]) surface.set(`${left + i % width},${bottom + Math.floor(i / width)}`, levels[i]);
 }
 
 const sizeText = ([x, y]) => x === y ? `${x}` : `${x} × ${y}`;
 
 function onHello(hello) {
-  hello.map = bytes(hello.map);
+  hello.colours = bytes(hello.colours);
   hello.pixel_mm = hello.pitch_mm.map((mm) => mm / hello.scale);
   supertac.hello = hello;
   supertac.newest = null;

@@ -108,10 +108,10 @@ function training() {
 // Windows side by side: what was felt, drawn and true, and how far apart the last two are.
 function windows(title, note, chosen) {
   if (chosen.length === 0) return "";
-  const map = bytes(data.map), {rows, columns, scale} = data;
+  const colours = bytes(data.colours), {rows, columns, scale} = data;
   const picture = (what, name, levels, r, c) => {
     const canvas = make("canvas", {role: "img", "aria-label": `${what}, ${name}`});
-    paint(canvas, map, r, c, (row, column) => levels[(r - 1 - row) * c + column]);
+    paint(canvas, colours, r, c, (row, column) => levels[(r - 1 - row) * c + column]);
     return make("span", {}, canvas, what);
   };
   return section(title, note, make("div", {class: "windows"}, ...chosen.map((one) => {
@@ -154,11 +154,11 @@ function evaluation() {
     parts.push(section("Intervals", "nine pixels in ten of each height should lie within", table([["pixels"],
       ["number", 0], ["within %", 1], ["half width", 3]], Object.entries(r.trust.coverage_of).map(([name, held]) =>
       [name, held.pixels, percent(held.share), held.half_width]))));
-  if (r.felt.length > 0)
+  if (r.by_distance.length > 0)
     parts.push(section("By distance since the first contact",
         "a texture cannot be known before its second element is under the array; contact windows",
         table([["slid from, mm", 0], ["windows", 0], ["SSIM", 3], ["PSNR dB", 2]],
-            r.felt.map((part) => [part.from_mm, part.windows, part.ssim, part.psnr_mean_db]))));
+            r.by_distance.map((part) => [part.from_mm, part.windows, part.ssim, part.psnr_mean_db]))));
   const elements = Object.entries(r.map ? r.map.surfaces : {}).flatMap(([name, surface]) =>
     (surface.elements || []).map((e) => [name, ...Object.values(e)]));
   if (elements.length > 0) {

@@ -62,11 +62,11 @@ TEST_F(Array, SixBySixFromSimulationToScores) {
   EXPECT_TRUE(scores.at("baselines").at("ridge").at("all").at("ssim").is_number());
   EXPECT_GT(scores.at("latency").at("ridge").at("median_us"), 0);
   double windows = 0, ssim = 0;  // by how much was felt: the parts make up the whole
-  for (const auto& part : scores.at("felt")) {
+  for (const auto& part : scores.at("by_distance")) {
     windows += part.at("windows").get<double>();
     ssim += part.at("windows").get<double>() * part.at("ssim").get<double>();
   }
-  EXPECT_GT(scores.at("felt").size(), 1U);
+  EXPECT_GT(scores.at("by_distance").size(), 1U);
   EXPECT_EQ(windows, scores.at("contact").at("windows"));
   EXPECT_NEAR(ssim / windows, scores.at("contact").at("ssim").get<double>(), 1e-9);
   const SafetensorsFile outputs = SafetensorsFile::read(path("outputs.safetensors"));

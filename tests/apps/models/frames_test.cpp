@@ -57,7 +57,7 @@ TEST_F(Frames, TrainScoreDrawAndReport) {
   EXPECT_GT(scores["all"]["psnr_mean_db"], scores["baselines"]["bicubic"]["all"]["psnr_mean_db"]);
   EXPECT_GT(scores["baselines"]["bicubic"]["all"]["psnr_mean_db"],
             scores["baselines"]["mean_image"]["all"]["psnr_mean_db"]);
-  EXPECT_TRUE(scores["felt"].empty()) << "nobody knows where it was";
+  EXPECT_TRUE(scores["by_distance"].empty()) << "nobody knows where it was";
   EXPECT_GE(scores["trust"]["coverage"], 0.87) << "training found nine in ten of each level on these groups";
   EXPECT_EQ(scores["trust"]["interval"], scores["trust"]["interval_found"]);
   EXPECT_TRUE(contains(scored.error, "found on these groups"));

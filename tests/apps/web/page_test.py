@@ -230,8 +230,8 @@ def check_snapshot(browser, folder):
     wait_until("all of it", lambda: file.read_bytes()[-8:-4] == b"IEND")
     png = Png(file.read_bytes())
     assert (png.width, png.height) == (1640, 1000)
-    map_ = browser.js("return Array.from(supertac.hello.map)")
-    known = {tuple(map_[i : i + 3]) for i in range(0, len(map_), 3)}
+    colours = browser.js("return Array.from(supertac.hello.colours)")
+    known = {tuple(colours[i : i + 3]) for i in range(0, len(colours), 3)}
     side = 2 * (390 - 36)
     centres = [(840 + 60 + (c + 0.5) * side / 16, 68 + 12 + (r + 0.5) * side / 16) for r in range(16) for c in range(16)]
     assert all(png.at(x, y) in known for x, y in centres)
@@ -385,7 +385,7 @@ def check_page(binaries, folder, browser, screenshots):
         check_snapshot(browser, folder)
         wait_until("rest on the texture", lambda: felt(browser) > 0.06 and is_at_rest(browser))
         check_rezero(browser)
-        colour_map = browser.js("return Array.from(supertac.hello.map)")
+        colour_map = browser.js("return Array.from(supertac.hello.colours)")
         stream.stop()
         wait_until("it says what became of the run", lambda: re.match(r"done: \d+ frames in", text(browser, "link")))
         for number, colours in seen:

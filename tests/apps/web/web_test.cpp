@@ -313,7 +313,7 @@ TEST(WebView, AnEventHoldsThePictureAndWhatIsKnownOfIt) {
   EXPECT_EQ(nlohmann::json(event["map"]), nlohmann::json({{"left", -2},
                                                           {"bottom", 5},
                                                           {"width", 2},
-                                                          {"felt", base64(mask)},
+                                                          {"known", base64(mask)},
                                                           {"values", levels_base64(state.map.values)}}));
   EXPECT_FALSE(event.contains("elements"));
   // One hill of nine cells, of which the middle is highest, at the left edge of what was felt.
