@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "data/frames/binary_decoder.h"
 #include "io/numbers/median.h"
@@ -150,6 +152,17 @@ void look_at_multiples(Column& column, std::span<const std::uint32_t> words) {
   column.steps = std::min(column.steps, bits_of_steps(counts, steps));
 }
 
+// Of a column of bytes the most frequent one, and the cost of the others: kNever where they are too many.
+std::pair<unsigned char, double> usual_of(std::span<const unsigned char> column) {
+  std::array<std::size_t, 256> counts{};
+  for (const unsigned char byte : column) ++counts[byte];
+  const auto usual = static_cast<unsigned char>(std::ranges::max_element(counts) - counts.begin());
+  Exceptions others;
+  for (std::size_t k = 0; k < column.size(); ++k)
+    others.add(column[k] != usual, k > 0 && column[k] == column[k - 1]);
+  return {usual, others.too_many() ? kNever : others.bits(8)};
+}
+
 // Of a clock that sends seconds as a real number.
 std::uint64_t microseconds(double seconds) {
   return seconds >= 0 && seconds < 1e10 ? static_cast<std::uint64_t>(std::llround(1e6 * seconds)) : 0;
@@ -166,17 +179,31 @@ BinaryColumns::BinaryColumns(Bytes bytes, const ByteStretch& stretch, double sec
 
 void BinaryColumns::find_constants() {
   const std::size_t period = stretch_.period;
-  constant_.assign(period, kNever), usual_.resize(period);
+  constant_.resize(period), usual_.resize(period);
+  std::vector<unsigned char> column(steps_ + 1);
   for (std::size_t c = 0; c < period; ++c) {
-    std::array<std::size_t, 256> counts{};
-    for (std::size_t k = 0; k <= steps_; ++k) ++counts[*at(k, c)];
-    const auto usual = std::ranges::max_element(counts);
-    usual_[c] = static_cast<unsigned char>(usual - counts.begin());
-    Exceptions others;
-    for (std::size_t k = 0; k <= steps_; ++k)
-      others.add(*at(k, c) != usual_[c], k > 0 && *at(k, c) == *at(k - 1, c));
-    if (!others.too_many()) constant_[c] = others.bits(8);
+    for (std::size_t k = 0; k <= steps_; ++k) column[k] = *at(k, c);
+    std::tie(usual_[c], constant_[c]) = usual_of(column);
   }
+  sums_ = crossed_ = {0};
+  for (const unsigned char byte : bytes_.subspan(stretch_.begin, stretch_.rows * period))
+    sums_.push_back(sums_.back() + byte), crossed_.push_back(crossed_.back() ^ byte);
+}
+
+double BinaryColumns::foreign_sum(std::size_t at) const {
+  std::array<std::vector<unsigned char>, 5> left;  // what stays the same where the byte follows
+  for (std::size_t k = 0; k <= steps_; ++k) {
+    const std::size_t begin = k * stretch_.period + at + 1, end = begin + stretch_.period;
+    const std::uint32_t all = sums_[end] - sums_[begin], sent = bytes_[stretch_.begin + end - 1];
+    for (const std::uint32_t modulus : {255, 256}) {
+      left[modulus - 255].push_back(static_cast<unsigned char>(all % modulus));
+      left[modulus - 253].push_back(static_cast<unsigned char>((all + 2 * modulus - 2 * sent) % modulus));
+    }
+    left[4].push_back(static_cast<unsigned char>(crossed_[end] ^ crossed_[begin]));
+  }
+  double least = kNever;
+  for (const std::vector<unsigned char>& column : left) least = std::min(least, usual_of(column).second);
+  return 14 + 8 + least;  // which form; which constant; exceptions
 }
 
 void BinaryColumns::find_values() {

@@ -94,6 +94,10 @@ class BinaryColumns {
   const std::vector<FieldFound>& fields(std::size_t at) const { return fields_[at % stretch_.period]; }
   /// Whether a checksum of this kind at byte `end` of the period is right for the bytes from `begin` on.
   bool is_checksum(const std::string& kind, bool big_endian, std::size_t begin, std::size_t end) const;
+  /// Cost of the byte at `at` of the period where it follows from the period's bytes that end with it, kNever
+  /// where it does not: as their sum plus a constant, or that negated, modulo 256 (two's complement) or 255
+  /// (ones'), or as their exclusive or with a constant.
+  double foreign_sum(std::size_t at) const;
   const ByteStretch& stretch() const { return stretch_; }
 
  private:
@@ -108,7 +112,8 @@ class BinaryColumns {
   Bytes bytes_;
   ByteStretch stretch_;
   double seconds_;
-  std::size_t steps_;  // from row to row
+  std::size_t steps_;                          // from row to row
+  std::vector<std::uint32_t> sums_, crossed_;  // of the stretch's bytes before each
   std::vector<double> constant_;
   std::vector<unsigned char> usual_;
   std::vector<Values> values_;
@@ -122,6 +127,7 @@ struct BinaryReading {
   double bits = 0, sent = 0;           ///< of the description, and of all bytes as they came
   bool unit_assumed = false;           ///< of the clock; a file says nothing of the time it took
   bool unknown = false;                ///< some bytes are no value and have no meaning that is known
+  bool foreign_sum = false;            ///< a byte behind the values follows from all others
   bool mixed = false;                  ///< its fields have two byte orders
   bool sign_unsure = false;            ///< signed, though what is below 0 is the same number each time
   std::string text() const;

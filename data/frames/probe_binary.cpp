@@ -66,6 +66,7 @@ double bits_of_type(const std::string& type) {
 struct Checksum {
   const char* kind = "none";
   bool big_endian = false;
+  bool foreign = false;  // a byte that follows from all others in a way that no sensor's file can say
 };
 
 // A reading as far as it is made: what is left from `begin` to `end` are values, or fields beside them.
@@ -103,6 +104,7 @@ class Search {
         sent_(8.0 * static_cast<double>(bytes.size())),
         outside_(8.0 * static_cast<double>(bytes.size() - (columns.stretch().rows - 1) * period_)) {
     find_checksums();
+    for (std::size_t end = 0; end < period_; ++end) foreign_sums_.push_back(columns.foreign_sum(end));
   }
 
   // Into `found`: the best of each kind that reads other numbers.
@@ -160,7 +162,13 @@ class Search {
           .end_bits = outside_ + trailer_bits + header_bits + kLengths[header] + start_bits_[start],
           .begin = start + header,
           .end = start + period_ - trailer};
-      if (header + trailer > 0) try_fields(plain);
+      if (header + trailer > 0) {
+        try_fields(plain);
+        Partly summed = plain;
+        summed.checksum.foreign = true, summed.end -= 1,
+        summed.end_bits += foreign_sums_[summed.end % period_];
+        try_fields(summed);
+      }
       for (const std::size_t width : {1, 2, 4}) {
         if (header + trailer + width + 2 > period_) continue;
         const std::size_t end = (start + 2 * period_ - trailer - width) % period_;
@@ -255,6 +263,8 @@ class Search {
     for (std::size_t k = 0; k < p.before; ++k) add(*p.found[k]);
     f.fields.push_back({FrameField::Is::values, count, ""});
     for (std::size_t k = p.all; k-- > p.before;) add(*p.found[k]);
+    if (p.checksum.foreign) f.fields.push_back({FrameField::Is::skip, 1, ""});
+    r.foreign_sum = p.checksum.foreign;
     const bool plain =
         f.fields.size() == 1 || (f.fields.size() == 2 && f.fields[0].is == FrameField::Is::time);
     if (plain) f.fields.clear();
@@ -271,6 +281,7 @@ class Search {
   std::optional<std::size_t> wanted_;
   double sent_, outside_, least_ = kNever;
   std::map<std::pair<std::size_t, std::size_t>, Checksum> checksums_;
+  std::vector<double> foreign_sums_;  // costs, by their place
   std::map<std::tuple<std::size_t, std::size_t, std::size_t, bool, std::size_t>, BinaryReading> best_;
 };
 
@@ -369,6 +380,8 @@ std::optional<BinaryReading> find_binary_format(Bytes bytes, std::span<const Hea
   }
   says.push_back("binary: " + best.text());
   if (second != nullptr) says.push_back("the next best reading: " + second->text());
+  if (best.foreign_sum)
+    says.push_back("a byte behind the values is a sum that no sensor's file can say: it is not checked");
   if (sign_assumed)
     says.push_back("assumed: its numbers have no sign, though i8 explains as much; set \"frame.type\"");
   if (best.unit_assumed)
