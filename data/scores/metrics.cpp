@@ -61,22 +61,22 @@ double local_ssim(const float* a, const float* b, std::size_t stride, const std:
          ((mean_a * mean_a + mean_b * mean_b + kC1) * (var_a + var_b + kC2));
 }
 
-void check_pixels(const char* where, std::size_t got, std::size_t expected) {
-  if (got != expected)
-    throw std::invalid_argument(
-        refusal(where, "image", std::to_string(expected) + " pixels", std::to_string(got)));
-}
+enum Of : std::uint8_t { kWindows, kPositions, kSilent, kFelt };
 
-using Field = std::pair<const char*, double Metrics::*>;
-constexpr std::array<Field, 9> kFields{{{"psnr_mean_db", &Metrics::psnr_mean_db},
-                                        {"psnr_pooled_db", &Metrics::psnr_pooled_db},
-                                        {"ssim", &Metrics::ssim},
-                                        {"phase_correlation", &Metrics::phase_correlation},
-                                        {"phase_correlation_floor", &Metrics::phase_correlation_floor},
-                                        {"position_error_px", &Metrics::position_error_px},
-                                        {"position_error_mm", &Metrics::position_error_mm},
-                                        {"ghost_rate", &Metrics::ghost_rate},
-                                        {"miss_rate", &Metrics::miss_rate}}};
+struct Figure {
+  const char* name;
+  double Metrics::*value;
+  Of of;  // it is a mean of these
+};
+constexpr Figure kFigures[] = {{"psnr_mean_db", &Metrics::psnr_mean_db, kWindows},
+                               {"psnr_pooled_db", &Metrics::psnr_pooled_db, kWindows},
+                               {"ssim", &Metrics::ssim, kWindows},
+                               {"phase_correlation", &Metrics::phase_correlation, kPositions},
+                               {"phase_correlation_floor", &Metrics::phase_correlation_floor, kPositions},
+                               {"position_error_px", &Metrics::position_error_px, kPositions},
+                               {"position_error_mm", &Metrics::position_error_mm, kPositions},
+                               {"ghost_rate", &Metrics::ghost_rate, kSilent},
+                               {"miss_rate", &Metrics::miss_rate, kFelt}};
 
 // The value farthest from 0.
 float extent(std::span<const float> image) {
@@ -88,7 +88,7 @@ float extent(std::span<const float> image) {
 
 double mean_squared_error(std::span<const float> a, std::span<const float> b) {
   if (a.empty()) throw std::invalid_argument(refusal("mean_squared_error", "image", "a pixel or more", "0"));
-  check_pixels("mean_squared_error", b.size(), a.size());
+  expect_values("mean_squared_error", "image", a.size(), b.size());
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const double d = static_cast<double>(a[i]) - b[i];
@@ -103,8 +103,8 @@ double ssim(std::span<const float> a, std::span<const float> b, std::size_t heig
   const std::size_t smaller = std::min(height, width);
   if (smaller < kFewestPixels)
     throw std::invalid_argument(refusal("ssim", "size", "3 pixels or more", std::to_string(smaller)));
-  check_pixels("ssim", a.size(), height * width);
-  check_pixels("ssim", b.size(), height * width);
+  expect_values("ssim", "image", height * width, a.size());
+  expect_values("ssim", "image", height * width, b.size());
   const std::vector<double> weights = ssim_weights(static_cast<int>(smaller));
   const std::size_t rows = height - weights.size() + 1, columns = width - weights.size() + 1;
   double sum = 0;
@@ -117,9 +117,9 @@ double ssim(std::span<const float> a, std::span<const float> b, std::size_t heig
 nlohmann::ordered_json to_json(const Metrics& metrics) {
   nlohmann::ordered_json json;
   json["windows"] = metrics.windows;
-  for (const auto& [name, field] : kFields)
+  for (const auto& [name, value, of] : kFigures)
     json[name] =
-        std::isfinite(metrics.*field) ? nlohmann::ordered_json(metrics.*field) : nlohmann::ordered_json();
+        std::isfinite(metrics.*value) ? nlohmann::ordered_json(metrics.*value) : nlohmann::ordered_json();
   return json;
 }
 
@@ -148,28 +148,28 @@ ImageScores ZoneMetrics::scores_of(std::span<const float> output, std::span<cons
   return scores;
 }
 
+MetricsAccumulator::MetricsAccumulator(const ImageGrid& grid) : grid_(grid) {
+  for (const Figure& figure : kFigures) sums_.*figure.value = 0;
+}
+
 void MetricsAccumulator::add(std::span<const float> output, std::span<const float> truth,
                              const ImageScores& scores, float silent) {
-  ++windows_;
-  mse_ += scores.mse;
-  psnr_ += psnr_db(scores.mse);
-  ssim_ += scores.ssim;
+  ++counts_[kWindows];
+  sums_.psnr_mean_db += psnr_db(scores.mse), sums_.psnr_pooled_db += scores.mse;
+  sums_.ssim += scores.ssim;
   const float there = extent(truth), drawn = extent(output);
-  silent_ += there <= silent ? 1 : 0;
-  ghosts_ += there <= silent && drawn > Metrics::kGhost ? 1 : 0;
-  felt_ += there > Metrics::kFelt ? 1 : 0;
-  misses_ += there > Metrics::kFelt && drawn < Metrics::kGhost ? 1 : 0;
+  if (there <= silent) ++counts_[kSilent], sums_.ghost_rate += drawn > Metrics::kGhost ? 1 : 0;
+  if (there > Metrics::kFelt) ++counts_[kFelt], sums_.miss_rate += drawn < Metrics::kGhost ? 1 : 0;
   if (!scores.has_position) return;
   sample(output, truth);
-  ++positions_;
-  peak_ += scores.phase_correlation;
-  distance_px_ += scores.position_error_px;
-  distance_mm_ += scores.position_error_mm;
+  ++counts_[kPositions];
+  sums_.phase_correlation += scores.phase_correlation;
+  sums_.position_error_px += scores.position_error_px, sums_.position_error_mm += scores.position_error_mm;
 }
 
 // Reservoir sampling (algorithm R): after n windows each is in the sample with the same probability.
 void MetricsAccumulator::sample(std::span<const float> output, std::span<const float> truth) {
-  const std::uint64_t n = positions_;
+  const std::uint64_t n = counts_[kPositions];
   if (n < kFloorPairs) {
     sampled_outputs_.insert(sampled_outputs_.end(), output.begin(), output.end());
     sampled_truths_.insert(sampled_truths_.end(), truth.begin(), truth.end());
@@ -203,26 +203,11 @@ double MetricsAccumulator::floor() const {
 }
 
 Metrics MetricsAccumulator::result() const {
-  Metrics metrics;
-  metrics.windows = windows_;
-  if (windows_ > 0) {
-    const auto n = static_cast<double>(windows_);
-    metrics.psnr_mean_db = psnr_ / n;
-    metrics.psnr_pooled_db = psnr_db(mse_ / n);
-    metrics.ssim = ssim_ / n;
-  }
-  const auto share = [](std::uint64_t part, std::uint64_t of) {
-    return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : Metrics::kNone;
-  };
-  metrics.ghost_rate = share(ghosts_, silent_);
-  metrics.miss_rate = share(misses_, felt_);
-  if (positions_ > 0) {
-    const auto n = static_cast<double>(positions_);
-    metrics.phase_correlation = peak_ / n;
-    metrics.phase_correlation_floor = floor();
-    metrics.position_error_px = distance_px_ / n;
-    metrics.position_error_mm = distance_mm_ / n;
-  }
+  Metrics metrics{.windows = counts_[kWindows]};
+  for (const auto& [name, value, of] : kFigures)
+    if (counts_[of] > 0) metrics.*value = sums_.*value / static_cast<double>(counts_[of]);
+  if (metrics.windows > 0) metrics.psnr_pooled_db = psnr_db(metrics.psnr_pooled_db);
+  if (counts_[kPositions] > 0) metrics.phase_correlation_floor = floor();
   return metrics;
 }
 

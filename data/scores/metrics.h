@@ -2,6 +2,7 @@
 // Images are [height][width], row-major. SSIM and PSNR take a range of 1; values beyond it count as they are.
 #pragma once
 
+#include <array>
 #include <complex>
 #include <cstdint>
 #include <cstdlib>
@@ -129,7 +130,7 @@ class MetricsAccumulator {
  public:
   static constexpr std::size_t kFloorPairs = 256;
 
-  explicit MetricsAccumulator(const ImageGrid& grid) : grid_(grid) {}
+  explicit MetricsAccumulator(const ImageGrid& grid);
   /// A truth that stays within `silent` of 0 shows nothing.
   void add(std::span<const float> output, std::span<const float> truth, const ImageScores& scores,
            float silent = 0);
@@ -140,9 +141,10 @@ class MetricsAccumulator {
   double floor() const;
 
   ImageGrid grid_;
-  std::uint64_t windows_ = 0, positions_ = 0;
-  std::uint64_t silent_ = 0, ghosts_ = 0, felt_ = 0, misses_ = 0;
-  double psnr_ = 0, mse_ = 0, ssim_ = 0, peak_ = 0, distance_px_ = 0, distance_mm_ = 0;  // sums
+  // By what a figure is a mean of: all windows, those with a position, those of silent truths and of felt
+  // ones.
+  std::array<std::uint64_t, 4> counts_{};
+  Metrics sums_;  // of the mean squared errors where the pooled PSNR stands
   std::vector<float> sampled_outputs_, sampled_truths_;  // up to kFloorPairs images each
 };
 

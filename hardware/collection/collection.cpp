@@ -1,6 +1,7 @@
 #include "hardware/collection/collection.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -15,12 +16,6 @@
 
 namespace supertac {
 namespace {
-
-// digits 10^exponent as the number that is written so: 3 and -1 give 0.3, which 3 * 0.1 is not.
-double decimal(double digits, double exponent) {
-  return exponent < 0 ? digits / std::round(std::pow(10, -exponent))
-                      : digits * std::round(std::pow(10, exponent));
-}
 
 std::string point_text(const Point3& p) {
   return format(p.x, 4) + " " + format(p.y, 4) + " " + format(p.z, 4);
@@ -202,8 +197,9 @@ std::string event_text(const PositionSample& sample) {
 
 double named_speed(double measured, double ordered) {
   if (!(measured > 0 && ordered > 0) || std::abs(measured / ordered - 1) < 0.005) return ordered;
-  const double exponent = std::floor(std::log10(measured)) - 2;
-  return decimal(std::round(measured / decimal(1, exponent)), exponent);
+  char digits[32];
+  const char* end = std::to_chars(digits, std::end(digits), measured, std::chars_format::general, 3).ptr;
+  return *parse_double({digits, end});
 }
 
 Sensor sensor_of(const Journal& journal) { return part_of_header(journal, "sensor", sensor_of_json); }
