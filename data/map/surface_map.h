@@ -51,10 +51,12 @@ class SurfaceMap {
 
   /// A picture [height][width] whose centre lies at (x_mm, y_mm), and the predicted error of each pixel
   /// (empty: not known, and then never). A place that is not finite is left out. Throws std::invalid_argument
-  /// when a size is wrong, std::runtime_error when the map would have more than kMostCells.
+  /// when a size is wrong, std::runtime_error when the map would have more than kMostCells, or a place lies
+  /// so far away that it is no mm.
   void add(double x_mm, double y_mm, std::span<const float> picture, std::span<const float> errors);
   /// The picture around (x_mm, y_mm) that the map has, [height][width], by Catmull-Rom interpolation; beside
-  /// what was never felt linear between felt cells, and NaN where there are none.
+  /// what was never felt linear between felt cells, and NaN where there are none. `picture` has the size of
+  /// grid(), unchecked.
   void read(double x_mm, double y_mm, std::span<float> picture) const;
 
   /// Around everything that was felt; around the newest picture.

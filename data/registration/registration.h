@@ -20,9 +20,9 @@ struct Contact {
 };
 
 /// The contacts of all taxels, by taxel and time. Rims are sought within reach_s to either side (about 0.6
-/// pitches); dips shallower than 8 mV, or than a tenth of the taxel's deepest one, are noise; a taxel
-/// that never moves has none. Throws std::invalid_argument when the recording's times do not increase, or
-/// span more than 10,000 s.
+/// pitches); dips shallower than 8 mV, or than a tenth of the taxel's deepest one, are noise; a taxel that
+/// never moves has none, nor has a recording of fewer than three frames. Throws std::invalid_argument when
+/// the recording's last time is not later than its first, or later by more than 10,000 s.
 std::vector<Contact> find_contacts(const Recording& recording, double reach_s = 0.5);
 
 /// Frames that a host lost without a trace, found in the signals. n numbers: how many are missing between

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "data/windows/split.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -14,12 +15,6 @@ namespace {
 std::vector<std::uint32_t> fitted_on(std::span<const std::uint32_t> train) {
   if (train.empty()) throw std::invalid_argument("baseline: there is no example to fit to");
   return evenly_spaced(train, kFitWindows);
-}
-
-void check_size(const char* what, std::size_t got, std::size_t expected) {
-  if (got != expected)
-    throw std::invalid_argument("baseline: " + std::string(what) + " expects " + std::to_string(expected) +
-                                " values, got " + std::to_string(got));
 }
 
 void check_input(std::span<const float> input, const TaxelArray& array) {
@@ -64,7 +59,7 @@ Baseline mean_image(const WindowSet& windows, std::span<const std::uint32_t> tra
   for (const double s : sum) image.push_back(static_cast<float>(s / static_cast<double>(chosen.size())));
   return {"mean_image", [array = windows.array(), image](auto input, auto out) {
             check_input(input, array);
-            check_size("the image", out.size(), image.size());
+            expect_values("baseline", "image", image.size(), out.size());
             std::ranges::copy(image, out.begin());
           }};
 }
@@ -74,8 +69,8 @@ std::function<void(std::span<const float>, std::span<float>)> bicubic_enlargemen
   const auto height = static_cast<std::size_t>(rows), width = static_cast<std::size_t>(columns);
   return [=, down = weights_of(rows, scale), across = weights_of(columns, scale)](auto frame, auto out) {
     const std::size_t down_pixels = down.size() / height, across_pixels = across.size() / width;
-    check_size("a frame", frame.size(), height * width);
-    check_size("the image", out.size(), down_pixels * across_pixels);
+    expect_values("baseline", "frame", height * width, frame.size());
+    expect_values("baseline", "image", down_pixels * across_pixels, out.size());
     std::vector<float> row(width);  // the frame's columns at this row of the image
     for (std::size_t r = 0; r < down_pixels; ++r) {
       std::fill(row.begin(), row.end(), 0.0F);
@@ -300,8 +295,8 @@ Baseline ridge(const WindowSet& windows, std::span<const std::uint32_t> train, c
   }
   const std::vector<double> w = (moments += other).solve(best, look);
   return {"ridge", [=, weights = std::vector<float>(w.begin(), w.end())](auto window, auto out) {
-            check_size("a window", window.size(), size);
-            check_size("the image", out.size(), pixels);
+            expect_values("baseline", "window", size, window.size());
+            expect_values("baseline", "image", pixels, out.size());
             std::vector<double> used(features);
             fill_features(window, signals, used);
             std::fill(out.begin(), out.end(), 0.0f);

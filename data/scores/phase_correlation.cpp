@@ -69,10 +69,7 @@ PhaseCorrelator::Spectrum PhaseCorrelator::transformed(const Spectrum& image, co
 
 // Empty when the image is flat.
 PhaseCorrelator::Spectrum PhaseCorrelator::spectrum_of(std::span<const float> image) const {
-  if (image.size() != surface_.size())
-    throw std::invalid_argument(refusal("phase correlation", "image",
-                                        std::to_string(surface_.size()) + " pixels",
-                                        std::to_string(image.size())));
+  expect_values("phase correlation", "image", surface_.size(), image.size());
   double mean = 0;
   for (const float v : image) mean += v;
   mean /= static_cast<double>(image.size());

@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 
@@ -25,9 +26,7 @@ void TaxelArray::check() const {
 }
 
 std::vector<float> mean_of_channels(const TaxelArray& array, std::span<const float> frame) {
-  if (frame.size() != array.signals())
-    throw std::invalid_argument("a frame of " + array.text() + " has " + std::to_string(array.signals()) +
-                                " values, got " + std::to_string(frame.size()));
+  expect_values("mean_of_channels", "frame", array.signals(), frame.size());
   const auto channels = static_cast<std::size_t>(array.channels);
   std::vector<float> mean(frame.size() / channels);
   for (std::size_t s = 0; s < frame.size(); ++s)

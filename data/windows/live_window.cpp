@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 #include "data/windows/transforms.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 LiveWindow::LiveWindow(const LiveWindowSettings& settings)
@@ -16,9 +15,7 @@ LiveWindow::LiveWindow(const LiveWindowSettings& settings)
       average_(settings.signals) {}
 
 void LiveWindow::push(double time_s, std::span<const float> frame) {
-  if (frame.size() != settings_.signals)
-    throw std::invalid_argument("live window: a frame has " + std::to_string(settings_.signals) +
-                                " signals, got " + std::to_string(frame.size()));
+  expect_values("live window", "frame", settings_.signals, frame.size());
   if (!std::isfinite(time_s) || !std::ranges::all_of(frame, [](float v) { return std::isfinite(v); })) return;
   if (!newest_s_ || std::abs(time_s - *newest_s_) > longest_silence_s(settings_.frame_period_s)) {
     if (newest_s_) ++gaps_;
@@ -53,9 +50,7 @@ void LiveWindow::average(double time_s, std::span<const float> frame) {
 }
 
 bool LiveWindow::window(std::span<float> out) const {
-  if (out.size() != ring_.size())
-    throw std::invalid_argument("live window: needs room for " + std::to_string(ring_.size()) +
-                                " values, got " + std::to_string(out.size()));
+  expect_values("live window", "window", ring_.size(), out.size());
   const auto timesteps = static_cast<std::size_t>(settings_.timesteps);
   if (resampler_.samples() < timesteps) return false;
   const auto oldest = static_cast<std::ptrdiff_t>(resampler_.samples() % timesteps * settings_.signals);

@@ -33,12 +33,11 @@ struct Split {
 };
 
 /// The random choices are EpochOrder(count, seed, stream) with stream 0 for windows and groups, 1 for plates
-/// and for a group held out,
-/// and 2 + p for the passes of plate p; the first of the order are tested. Plates and groups are counted in
-/// alphabetical order, passes as in WindowSet::passes(); those without windows do not count. A pure function
-/// of the set, kind and seed; trial and none do not use the seed. Throws std::invalid_argument when a side
-/// would be empty, saying what the data lacks. `leave_out`: of split texture the plates that are tested,
-/// of split group the groups.
+/// and for a group held out, and 2 + p for the passes of plate p; the first of the order are tested. Plates
+/// and groups are counted in alphabetical order, passes as in WindowSet::passes(); those without windows do
+/// not count. A pure function of the set, kind and seed; trial and none do not use the seed. `leave_out`: of
+/// split texture the plates that are tested, of split group the groups. Throws std::invalid_argument when a
+/// side would be empty, saying what the data lacks, or when it has none of that name to leave out.
 Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
                  const std::vector<std::string>& leave_out = {});
 

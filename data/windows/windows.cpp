@@ -47,12 +47,6 @@ void delay_truth(Track& track, std::size_t frames) {
 constexpr double kClearanceMm = 1.5;
 constexpr std::size_t kFingerNumbers = 3;  // x, y, lift
 
-void check_size(const char* what, std::size_t got, std::size_t expected) {
-  if (got != expected)
-    throw std::invalid_argument("windows: " + std::string(what) + " needs room for " +
-                                std::to_string(expected) + " values, got " + std::to_string(got));
-}
-
 }  // namespace
 
 std::string WindowCounts::summary() const {
@@ -250,7 +244,7 @@ void WindowSet::read_samples(std::size_t i, std::size_t frames_back, std::span<f
 }
 
 void WindowSet::window(std::size_t i, std::span<float> out) const {
-  check_size("a window", out.size(), input_size());
+  expect_values("windows", "window", input_size(), out.size());
   read_samples(i, frames() - 1, out);
   if (settings_.scaling.per_window) normalise_window(out, array().signals());
 }
@@ -279,7 +273,7 @@ std::string WindowSet::place_text(std::size_t i) const {
 }
 
 void WindowSet::truth(std::size_t i, std::span<float> out) const {
-  check_size("a truth image", out.size(), image().pixels());
+  expect_values("windows", "truth", image().pixels(), out.size());
   const Place place = place_of(i);
   if (truth_is_measured(place.pass))
     return file_->read(stored_[place.pass].truths + place.last * out.size(), out);

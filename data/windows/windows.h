@@ -93,8 +93,9 @@ class WindowSet {
   /// Throws std::invalid_argument on settings out of range.
   explicit WindowSet(const WindowSettings& settings);
   /// Appends the windows of one recording. `folder`: where the recording lies, for a plate that is an STL
-  /// file beside it. Throws as plate_in_folder() and resample(), std::runtime_error for another array, or a
-  /// measured truth that is not scale() times as fine as the array; FileError as ScratchFile.
+  /// file beside it. Throws as plate_in_folder() and resample(), std::runtime_error for another array, unit
+  /// or polarity, or a measured truth that is not scale() times as fine as the array; FileError as
+  /// ScratchFile.
   void add(const Recording& recording, const std::string& folder = ".", const PassUse& use = {});
 
   std::size_t size() const { return counts_.windows; }

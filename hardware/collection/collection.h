@@ -67,9 +67,9 @@ MoveTiming timing_of(std::span<const Leg> ended);
 double fitted_speed(const Leg& leg, const std::vector<PositionSample>& samples);
 
 /// Where the head was, from the polled positions of one pass. The speed of a leg is the median of its
-/// samples' own. Then the longest chain of samples is kept in which each can be reached from the one before
-/// at this speed, or the run's fastest; the others were damaged, late, or misdated while the host stood
-/// still. Between samples the position is linear in time.
+/// samples' own. The longest chain of samples is kept in which each can be reached from the one before at the
+/// ordered speed times MoveTiming::faster; the others were damaged, late, or misdated while the host stood
+/// still. Between samples the position is linear in time, outside of begin() to end() that of the nearer one.
 class PositionTrack {
  public:
   /// Adds a leg's samples; without samples the leg is modelled as a trapezoid of speed that begins by

@@ -44,7 +44,8 @@ class Port {
   virtual Received read(std::span<std::byte> buffer, double until) = 0;
 
   /// Writes all bytes, returns the time at which the last one was handed over.
-  /// Throws PortTimeout when the device does not take them by `until`, PortUnplugged when it is gone.
+  /// Throws PortTimeout when the device does not take them by `until`, PortUnplugged when it is gone,
+  /// PortError where the port is only read.
   virtual double write(std::span<const std::byte> bytes, double until) = 0;
 };
 

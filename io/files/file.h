@@ -67,7 +67,7 @@ struct OutputPath {
 
 /// Renames a finished file or folder, on the same file system, to `output`, or to NAME-2, NAME-3, ... before
 /// the extension where that name is taken. Returns the name. Throws FileError; what was finished is then
-/// still where it was.
+/// still where it was, unless the message says that only the sync of the directory failed.
 std::string publish(const std::string& finished, const OutputPath& output);
 
 /// A file that appears under its name complete or not at all: written to a temporary name in the same

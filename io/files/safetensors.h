@@ -85,8 +85,8 @@ struct TensorToWrite {
 
 /// Writes the file atomically (io/files/file.h), with version and checksum; the same arguments give the same
 /// bytes. Throws std::invalid_argument when bytes and shape disagree, a name appears twice or is
-/// "__metadata__", a dtype is unknown, the metadata holds a field of this layer, or a cap of read() would be
-/// exceeded; FileError when the file cannot be written.
+/// "__metadata__", a dtype is unknown, the metadata holds a field of this layer, a text is no UTF-8, or a cap
+/// of read() would be exceeded; FileError when the file cannot be written.
 void write_safetensors(const OutputPath& output, std::map<std::string, std::string> metadata,
                        const std::vector<TensorToWrite>& tensors);
 

@@ -1,6 +1,7 @@
 #include "io/numbers/text.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 namespace supertac {
 
@@ -15,6 +16,12 @@ std::string refusal(std::string_view of, std::string_view argument, std::string_
   std::string text(of);
   text.append(": ").append(argument).append(" expects ").append(expected).append(", got ").append(got);
   return text;
+}
+
+void expect_values(std::string_view of, std::string_view argument, std::size_t expected, std::size_t got) {
+  if (got != expected)
+    throw std::invalid_argument(
+        refusal(of, argument, std::to_string(expected) + " values", std::to_string(got)));
 }
 
 std::string in_quotes(std::string_view text) { return "'" + printable(text) + "'"; }
@@ -49,13 +56,8 @@ std::vector<std::string_view> split_line(std::string_view line, char separator) 
 }
 
 std::vector<std::string> comma_list(const std::string& text) {
-  std::vector<std::string> words;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t comma = std::min(text.find(',', at), text.size());
-    words.push_back(text.substr(at, comma - at));
-    at = comma + 1;
-  }
-  return words;
+  const std::vector<std::string_view> words = split_line(text, ',');
+  return {words.begin(), words.end()};
 }
 
 }  // namespace supertac

@@ -21,6 +21,8 @@ std::string in_quotes(std::string_view text);
 /// (autograd/record.h).
 std::string refusal(std::string_view of, std::string_view argument, std::string_view expected,
                     std::string_view got);
+/// Throws std::invalid_argument, a refusal(), unless `got` values are as many as expected.
+void expect_values(std::string_view of, std::string_view argument, std::size_t expected, std::size_t got);
 
 /// Of ASCII; what is no capital letter stays.
 constexpr char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
@@ -36,7 +38,7 @@ std::string_view trimmed(std::string_view text);
 /// space.
 std::vector<std::string_view> split_line(std::string_view line, char separator);
 
-/// The parts between the commas, untrimmed; none for an empty text.
+/// The parts between the commas, as split_line().
 std::vector<std::string> comma_list(const std::string& text);
 
 /// The words or numbers, or that member or function of each, with `between` between them.

@@ -158,13 +158,12 @@ TEST(Baselines, NeedWindowsToFitToAndTheirSizes) {
   EXPECT_REFUSAL("baseline: there is no example to fit to", ridge(set, {}));
   std::vector<float> out(256), small(64);
   for (const Baseline& baseline : fit_baselines(set, all_of(set))) {
-    EXPECT_REFUSAL(baseline.name == "ridge" ? "baseline: a window expects 256 values, got 15"
+    EXPECT_REFUSAL(baseline.name == "ridge" ? "baseline: window expects 256 values, got 15"
                                             : "baseline: an input is [T][16], got 15 values",
                    baseline.predict(std::vector<float>(15), out));
-    EXPECT_REFUSAL("baseline: the image expects 256 values, got 64",
-                   baseline.predict(set.raw_window(0), small));
+    EXPECT_REFUSAL("baseline: image expects 256 values, got 64", baseline.predict(set.raw_window(0), small));
   }
-  EXPECT_REFUSAL("baseline: a frame expects 16 values, got 15",
+  EXPECT_REFUSAL("baseline: frame expects 16 values, got 15",
                  bicubic_enlargement(4, 4, 4)(std::vector<float>(15), out));
 }
 

@@ -95,7 +95,7 @@ TEST(Ssim, AgreesWithHandComputedWindow) {
 
 TEST(Ssim, RefusesImagesWithoutAValidPosition) {
   EXPECT_REFUSAL("ssim: size expects 3 pixels or more, got 2", ssim(flat(0, 2), flat(0, 2)));
-  EXPECT_REFUSAL("ssim: image expects 256 pixels, got 64", ssim(flat(0, 16), flat(0, 8)));
+  EXPECT_REFUSAL("ssim: image expects 256 values, got 64", ssim(flat(0, 16), flat(0, 8)));
 }
 
 TEST(MetricsAccumulator, OfNothingIsNull) {
@@ -274,7 +274,7 @@ TEST(PhaseCorrelation, RefusesOtherSizes) {
   EXPECT_REFUSAL("phase correlation: sides expects 4 pixels or more, got 8x2", PhaseCorrelator(8, 2));
   PhaseCorrelator correlator(8, 8);
   const std::vector<float> small(64), large(65);
-  EXPECT_REFUSAL("phase correlation: image expects 64 pixels, got 65", correlator(small, large));
+  EXPECT_REFUSAL("phase correlation: image expects 64 values, got 65", correlator(small, large));
 }
 
 // Every size that an array of up to 64x64 taxels and a scale of 2, 4 or 8 can give, but for the largest,

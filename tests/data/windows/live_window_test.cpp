@@ -205,7 +205,7 @@ TEST(LiveWindow, TakesADamagedFrameAsLost) {
 TEST(LiveWindow, RefusesAWrongRoom) {
   LiveWindow live(live_settings(300));
   Window small(10);
-  EXPECT_REFUSAL("live window: needs room for 256 values, got 10", live.window(small));
+  EXPECT_REFUSAL("live window: window expects 256 values, got 10", live.window(small));
 }
 
 }  // namespace supertac::live_window_test

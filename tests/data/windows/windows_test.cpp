@@ -213,8 +213,8 @@ TEST(Windows, RefuseOutputsOfAnotherSizeAndUnknownPlates) {
   WindowSet set(wide_settings(16));
   set.add(make_recording({}));
   std::vector<float> small(255);
-  EXPECT_REFUSAL("windows: a window needs room for 256 values, got 255", set.window(0, small));
-  EXPECT_REFUSAL("windows: a truth image needs room for 256 values, got 255", set.truth(0, small));
+  EXPECT_REFUSAL("windows: window expects 256 values, got 255", set.window(0, small));
+  EXPECT_REFUSAL("windows: truth expects 256 values, got 255", set.truth(0, small));
   EXPECT_ERROR(set.add(make_recording({.plate = "carpet"})), std::invalid_argument,
                "plate \"carpet\": unknown texture \"carpet\"; expected a rig plate");
   EXPECT_REFUSAL(
