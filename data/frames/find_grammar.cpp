@@ -103,18 +103,21 @@ struct Survey {
 Survey survey_of(const std::vector<std::string>& lines, char decimal) {
   Survey survey;
   std::map<std::size_t, std::size_t> counts;
-  for (const std::string& line : lines) ++counts[slots_of(behind_stamp(line), 0, decimal).size()];
+  std::vector<std::vector<TextSlot>> all;
+  for (const std::string& line : lines)
+    ++counts[all.emplace_back(slots_of(behind_stamp(line), 0, decimal)).size()];
   std::size_t most = 0;
   for (const auto& [count, of] : counts)
     if (count * of > most) most = count * of, survey.usual = count;
   bool stamped = true;
-  for (const std::string& line : lines) {
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const std::string& line = lines[i];
+    const std::vector<TextSlot>& slots = all[i];
     const std::string_view content = behind_stamp(line);
     if (content.empty()) {
       if (survey.kinds.empty() || survey.kinds.back() != Kind{}) survey.kinds.emplace_back();
       continue;
     }
-    const auto slots = slots_of(content, 0, decimal);
     const std::size_t first = slots.empty() ? content.size() : slots[0].text.data() - content.data();
     survey.kinds.push_back({std::string(trimmed(content.substr(0, first))), slots.size()});
     if (slots.empty() || slots.size() != survey.usual) continue;

@@ -77,11 +77,10 @@ std::optional<double> wall_time(std::string_view text, std::size_t& i) {
 }
 
 bool no_value(std::string_view text) {
-  std::string small;
-  for (const char c : text) small += lower(c);
   constexpr std::array kNone{"nan", "-nan", "+nan", "null", "none", "n/a",  "na",
                              "-",   "--",   "---",  "inf",  "-inf", "+inf", "ovf"};
-  return std::ranges::find(kNone, small) != kNone.end();
+  return std::ranges::any_of(
+      kNone, [&](std::string_view none) { return std::ranges::equal(none, text, {}, {}, lower); });
 }
 
 /// Whether a mark at i, behind a digit, parts thousands: three digits follow, and no fourth.
@@ -105,33 +104,29 @@ std::optional<double> number_at(std::string_view text, std::size_t& i, char deci
     i = end;
     return minus ? -number : number;
   }
-  std::string plain = at(text, i) == '-' ? "-" : "";
-  const std::size_t begin = plain.size();
+  const std::size_t begin = k;
   const auto take = [&] {
-    while (digit(at(text, k)) || (at(text, k) == '\'' && thousands(text, k))) {
-      if (digit(text[k])) plain += text[k];
-      ++k;
-    }
+    while (digit(at(text, k)) || (at(text, k) == '\'' && thousands(text, k))) ++k;
   };
   take();
-  const bool whole = plain.size() > begin;
   // Where commas are points, points are too: a clock may be written with one, and the signals not.
   const char point = at(text, k);
-  if ((point == '.' || point == decimal) && (digit(at(text, k + 1)) || (point == '.' && whole))) {
-    plain += (whole ? "." : "0."), ++k;
+  if ((point == '.' || point == decimal) && (digit(at(text, k + 1)) || (point == '.' && k > begin))) {
+    ++k;
     take();
   }
-  if (plain.size() == begin) return std::nullopt;
+  if (k == begin) return std::nullopt;
   if (const char mark = lower(at(text, k)); mark == 'e' || mark == 'd') {
     const std::size_t power = k + 1 + (at(text, k + 1) == '-' || at(text, k + 1) == '+' ? 1 : 0);
     if (digit(at(text, power)) && (mark == 'e' || power > k + 1)) {
-      plain += 'e';
-      if (at(text, k + 1) == '-') plain += '-';
       k = power;
       take();
     }
   }
-  if (plain.back() == '.') plain.pop_back();
+  const std::size_t from = text[i] == '-' ? i : begin;
+  std::string plain(text.substr(from, k - from));
+  for (char& c : plain) c = c == decimal ? '.' : lower(c) == 'd' ? 'e' : c;
+  std::erase(plain, '\'');
   const char next = at(text, k);
   if ((next == '.' || (next == ',' && decimal == ',' && point == '.')) && digit(at(text, k + 1)))
     return std::nullopt;  // 1.2.3, and 1.234,5
@@ -210,7 +205,9 @@ std::string clean_line(std::string_view line) {
 std::vector<TextSlot> slots_of(std::string_view line, char separator, char decimal) {
   std::vector<TextSlot> slots;
   if (separator != 0) {
-    for (std::string_view cell : split_line(line, separator)) {
+    const auto cells = split_line(line, separator);
+    slots.reserve(cells.size());
+    for (std::string_view cell : cells) {
       if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"')
         cell = trimmed(cell.substr(1, cell.size() - 2));
       slots.push_back(cell_of(cell, decimal));

@@ -43,11 +43,11 @@ std::string_view trimmed(std::string_view text) {
 }
 
 std::vector<std::string_view> split_line(std::string_view line, char separator) {
+  const auto separates = [=](char c) { return c == separator || (separator == ' ' && c == '\t'); };
   std::vector<std::string_view> columns;
   line = trimmed(line);
   while (!line.empty()) {
-    const std::size_t end =
-        std::min(separator == ' ' ? line.find_first_of(" \t") : line.find(separator), line.size());
+    const auto end = static_cast<std::size_t>(std::ranges::find_if(line, separates) - line.begin());
     columns.push_back(trimmed(line.substr(0, end)));
     line.remove_prefix(std::min(end + 1, line.size()));
     if (separator == ' ') line = trimmed(line);
