@@ -43,14 +43,13 @@ class PassSignals {
     time_s_.assign(begin, end);
     const auto first = static_cast<std::size_t>(begin - time.begin());
     for (std::size_t row = 0; row < kProfileRows; ++row) {
-      std::vector<double> pressed(time_s_.size());
-      for (std::size_t i = 0; i < pressed.size(); ++i)
-        for (std::size_t column = 0; column < rig::kTaxelColumns; ++column) {
-          const float v = recording.signals[(first + i) * rig::kTaxels + row * rig::kTaxelColumns + column];
-          pressed[i] += Scaling{}(v) / rig::kTaxelColumns;
-        }
-      sum_[row].assign(pressed.size() + 1, 0);
-      for (std::size_t i = 0; i < pressed.size(); ++i) sum_[row][i + 1] = sum_[row][i] + pressed[i];
+      sum_[row] = {0};
+      for (std::size_t i = first; i < first + time_s_.size(); ++i) {
+        double pressed = 0;
+        for (std::size_t k = row * rig::kTaxelColumns; k < (row + 1) * rig::kTaxelColumns; ++k)
+          pressed += Scaling{}(recording.signals[i * rig::kTaxels + k]) / rig::kTaxelColumns;
+        sum_[row].push_back(sum_[row].back() + pressed);
+      }
     }
   }
 

@@ -123,7 +123,7 @@ nlohmann::ordered_json to_json(const Metrics& metrics) {
   return json;
 }
 
-ImageScores ZoneMetrics::scores_of(std::span<const float> output, std::span<const float> truth) {
+ImageScores ZoneMetrics::scores_of(std::span<const float> output, std::span<const float> truth) const {
   for (std::size_t i = 0; i < output.size(); ++i)
     if (!std::isfinite(output[i]))
       throw std::invalid_argument("metrics: output pixel " + std::to_string(i) + " is not finite");
@@ -193,7 +193,7 @@ double MetricsAccumulator::floor() const {
   const RandomStream random(stream_named("floor"), 1);
   for (std::size_t i = count - 1; i > 0; --i)
     std::swap(partner[i], partner[static_cast<std::size_t>(random.uniform(i) * static_cast<double>(i))]);
-  PhaseCorrelator correlator(grid_.height, grid_.width);
+  const PhaseCorrelator correlator(grid_.height, grid_.width);
   double sum = 0;
   for (std::size_t i = 0; i < count; ++i)
     sum += correlator(std::span(sampled_outputs_).subspan(i * pixels, pixels),

@@ -58,8 +58,7 @@ struct PhaseCorrelation {
 /// would pull displacements towards 0 (the Hann window stands still): at 0.1 by up to a third, at 0.001 by
 /// less than a tenth. Without the Hann window two identical ridge images score 1/16: a ridge varies along one
 /// axis only, so all other columns of the spectrum are 0/0. With it they score about 0.93. The value ignores
-/// amplitude, unrelated images score about 0.2, and periodic textures alias modulo their pitch. One object
-/// serves one thread.
+/// amplitude, unrelated images score about 0.2, and periodic textures alias modulo their pitch.
 class PhaseCorrelator {
  public:
   static constexpr double kPeakEpsilon = 1e-12;
@@ -71,7 +70,7 @@ class PhaseCorrelator {
   PhaseCorrelator(int height, int width);
 
   /// `a`, `b`  [height][width]. Throws std::invalid_argument on another number of pixels.
-  PhaseCorrelation operator()(std::span<const float> a, std::span<const float> b);
+  PhaseCorrelation operator()(std::span<const float> a, std::span<const float> b) const;
 
  private:
   using Plan = std::unique_ptr<kiss_fft_state, decltype(&std::free)>;
@@ -83,12 +82,11 @@ class PhaseCorrelator {
 
   Spectrum transformed(const Spectrum& image, const Plans& plans) const;
   Spectrum spectrum_of(std::span<const float> image) const;
-  void correlate(const Spectrum& a, const Spectrum& b, double epsilon);
+  std::vector<float> surface_of(const Spectrum& a, const Spectrum& b, double epsilon) const;
 
   int height_, width_;
   Plans forward_, inverse_;
   std::vector<float> down_, across_;  // Hann windows of both axes
-  std::vector<float> surface_;        // [height][width]
 };
 
 /// Scores of one output against its truth.
@@ -166,8 +164,7 @@ class ZoneMetrics {
 
  private:
   enum Part { kAll, kContact, kFlat, kAir, kEdge, kParts };
-  ImageScores scores_of(std::span<const float> output, std::span<const float> truth);
-
+  ImageScores scores_of(std::span<const float> output, std::span<const float> truth) const;
   bool on_edge(std::span<const float> truth, float level) const;
 
   ImageGrid grid_;

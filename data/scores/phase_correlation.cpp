@@ -48,8 +48,7 @@ PhaseCorrelator::PhaseCorrelator(int height, int width)
       forward_(height, width, false),
       inverse_(height, width, true),
       down_(hann(height)),
-      across_(hann(width)),
-      surface_(down_.size() * across_.size()) {}
+      across_(hann(width)) {}
 
 // One axis after the other: kissfft's own plan for two axes asks for too little memory at most sizes and then
 // gives none.
@@ -69,7 +68,7 @@ PhaseCorrelator::Spectrum PhaseCorrelator::transformed(const Spectrum& image, co
 
 // Empty when the image is flat.
 PhaseCorrelator::Spectrum PhaseCorrelator::spectrum_of(std::span<const float> image) const {
-  expect_values("phase correlation", "image", surface_.size(), image.size());
+  expect_values("phase correlation", "image", down_.size() * across_.size(), image.size());
   double mean = 0;
   for (const float v : image) mean += v;
   mean /= static_cast<double>(image.size());
@@ -83,8 +82,8 @@ PhaseCorrelator::Spectrum PhaseCorrelator::spectrum_of(std::span<const float> im
   return deviation > kFlat ? transformed(windowed, forward_) : Spectrum();
 }
 
-// surface_ = IFFT2(R / (|R| + epsilon max|R|))
-void PhaseCorrelator::correlate(const Spectrum& a, const Spectrum& b, double epsilon) {
+// IFFT2(R / (|R| + epsilon max|R|)), [height][width]
+std::vector<float> PhaseCorrelator::surface_of(const Spectrum& a, const Spectrum& b, double epsilon) const {
   std::vector<std::complex<double>> products;
   double strongest = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -94,22 +93,21 @@ void PhaseCorrelator::correlate(const Spectrum& a, const Spectrum& b, double eps
   Spectrum cross;
   for (const std::complex<double>& r : products)
     cross.emplace_back(r / ((std::abs(r) + epsilon * strongest) * static_cast<double>(a.size())));
-  const Spectrum surface = transformed(cross, inverse_);
-  std::ranges::transform(surface, surface_.begin(), [](std::complex<float> value) { return value.real(); });
+  std::vector<float> surface;
+  for (const std::complex<float> value : transformed(cross, inverse_)) surface.push_back(value.real());
+  return surface;
 }
 
-PhaseCorrelation PhaseCorrelator::operator()(std::span<const float> a, std::span<const float> b) {
+PhaseCorrelation PhaseCorrelator::operator()(std::span<const float> a, std::span<const float> b) const {
   const Spectrum of_a = spectrum_of(a), of_b = spectrum_of(b);
   if (of_a.empty() || of_b.empty()) return {};
   PhaseCorrelation result{.defined = true};
-  correlate(of_a, of_b, kPeakEpsilon);
-  result.peak = *std::max_element(surface_.begin(), surface_.end());
-
-  correlate(of_a, of_b, kShiftEpsilon);
-  const int top = static_cast<int>(std::max_element(surface_.begin(), surface_.end()) - surface_.begin());
+  result.peak = std::ranges::max(surface_of(of_a, of_b, kPeakEpsilon));
+  const std::vector<float> surface = surface_of(of_a, of_b, kShiftEpsilon);
+  const int top = static_cast<int>(std::ranges::max_element(surface) - surface.begin());
   const int row = top / width_, column = top % width_;
   const auto at = [&](int r, int c) {
-    return surface_[static_cast<std::size_t>((r + height_) % height_ * width_ + (c + width_) % width_)];
+    return surface[static_cast<std::size_t>((r + height_) % height_ * width_ + (c + width_) % width_)];
   };
   const double dy = row + parabola_top(at(row - 1, column), at(row, column), at(row + 1, column));
   const double dx = column + parabola_top(at(row, column - 1), at(row, column), at(row, column + 1));

@@ -129,10 +129,8 @@ TEST(Stl, FilesAreReadWithALimit) {
 
 TEST(Stl, FuzzCorpus) { EXPECT_GE(replay("stl", check_stl), 256); }
 
-using Point = std::array<float, 3>;
-
-void add_quad(std::vector<Triangle>& triangles, const Point& a, const Point& b, const Point& c,
-              const Point& d) {
+void add_quad(std::vector<Triangle>& triangles, const Vertex& a, const Vertex& b, const Vertex& c,
+              const Vertex& d) {
   triangles.push_back({a, b, c});
   triangles.push_back({a, c, d});
 }
@@ -151,10 +149,10 @@ void expect_map_refused(const std::vector<Triangle>& triangles, const std::strin
 }
 
 TEST(HeightMap, HeightIsThatOfTheHighestTriangleAboveTheOutline) {
-  auto triangles = sheet(7, -20, 300);                                              // anywhere, at any height
-  add_quad(triangles, {-10, 340, 8}, {-5, 340, 8}, {-5, 350, 8}, {-10, 350, 8});    // a step of 1 mm
-  add_quad(triangles, {-10, 340, 4}, {-10, 350, 4}, {-5, 350, 4}, {-5, 340, 4});    // below: hidden
-  triangles.push_back({Point{0, 340, 7}, Point{10, 340, 7}, Point{0, 340, 9.5F}});  // a wall
+  auto triangles = sheet(7, -20, 300);                                            // anywhere, at any height
+  add_quad(triangles, {-10, 340, 8}, {-5, 340, 8}, {-5, 350, 8}, {-10, 350, 8});  // a step of 1 mm
+  add_quad(triangles, {-10, 340, 4}, {-10, 350, 4}, {-5, 350, 4}, {-5, 340, 4});  // below: hidden
+  triangles.push_back({Vertex{0, 340, 7}, Vertex{10, 340, 7}, Vertex{0, 340, 9.5F}});  // a wall
   const HeightMap map = height_map_of(triangles);
   EXPECT_EQ(map(12, 45), 1);
   EXPECT_EQ(map(9.5, 45), 0);
@@ -171,14 +169,14 @@ TEST(HeightMap, HeightIsThatOfTheHighestTriangleAboveTheOutline) {
 
 TEST(HeightMap, ATipThatOnlyTouchesANodeCounts) {
   auto triangles = sheet();
-  triangles.push_back({Point{10, 20, 1}, Point{12, 20, 1}, Point{11, 22, 2}});
+  triangles.push_back({Vertex{10, 20, 1}, Vertex{12, 20, 1}, Vertex{11, 22, 2}});
   EXPECT_EQ(height_map_of(triangles)(11, 22), 2);
 }
 
 TEST(HeightMap, SlantedFacesAreExactAtNodesAndLinearBetween) {
   std::vector<Triangle> triangles;
   const auto z = [](float x, float y) { return 0.05F * x - 0.02F * y; };
-  const auto at = [&](float x, float y) { return Point{x, y, z(x, y)}; };
+  const auto at = [&](float x, float y) { return Vertex{x, y, z(x, y)}; };
   triangles.push_back({at(0, 0), at(36, 0), at(0, 108)});
   triangles.push_back({at(36, 0), at(36, 108), at(0, 108)});
   const HeightMap map = height_map_of(triangles);
@@ -212,7 +210,7 @@ TEST(HeightMap, AFlatPlateHasNoTexture) {
 TEST(HeightMap, RefusesOtherSizesHolesAndOverlaps) {
   auto inches = sheet();
   for (Triangle& triangle : inches)
-    for (Point& corner : triangle)
+    for (Vertex& corner : triangle)
       for (float& value : corner) value /= 25.4F;
   expect_map_refused(inches, "measures 1.42 x 4.25 mm in x and y, expected 36 x 108");
   std::vector<Triangle> turned;
@@ -223,7 +221,7 @@ TEST(HeightMap, RefusesOtherSizesHolesAndOverlaps) {
   std::vector<Triangle> heap;
   for (int i = 0; i < 300; ++i) heap.push_back(sheet()[0]);
   expect_map_refused(heap, "cover the plate more than");
-  std::vector<Triangle> point = {{Point{1, 1, 1}, Point{1, 1, 1}, Point{1, 1, 1}}};
+  std::vector<Triangle> point = {{Vertex{1, 1, 1}, Vertex{1, 1, 1}, Vertex{1, 1, 1}}};
   expect_map_refused(point, "measures 0.00 x 0.00 mm");
 }
 
@@ -241,7 +239,7 @@ Plate read(const std::vector<Triangle>& solid, const std::string& name) {
 // Every directed edge once, and its opposite once: closed, manifold, facing one way.
 TEST(PlateMesh, EveryEdgeBelongsToTwoTriangles) {
   for (const std::string& name : plates()) {
-    std::map<std::pair<Point, Point>, int> edges;
+    std::map<std::pair<Vertex, Vertex>, int> edges;
     for (const Triangle& t : mesh_of(Plate::named(name)))
       for (std::size_t i = 0; i < 3; ++i) ++edges[{t[i], t[(i + 1) % 3]}];
     for (const auto& [edge, count] : edges) {
@@ -295,14 +293,10 @@ TEST(PlateMesh, RigPlatesComeBackExactlyAtTheNodes) {
 // A block with upright sides, one with a slope across that is less than what counts as uniform, a hill that
 // ends at the plate's edge: read, written and read again, twice.
 TEST(PlateMesh, APlateThatWasReadIsWrittenAsItIs) {
-  const auto box = [](float from, float to, float low, float high) {
-    const Point a{0, from, low}, b{36, from, high}, c{36, to, high}, d{0, to, low};
-    return std::vector<Triangle>{{a, b, c}, {a, c, d}};
-  };
-  const std::vector<Triangle> ground = box(0, 108, 0, 0);
-  for (const auto& top : {box(40, 50, 2, 2), box(40.05F, 50, 2, 2.04F), box(60, 108, 1, 1)}) {
-    std::vector<Triangle> triangles = ground;
-    triangles.insert(triangles.end(), top.begin(), top.end());
+  constexpr float kBlocks[][4] = {{40, 50, 2, 2}, {40.05F, 50, 2, 2.04F}, {60, 108, 1, 1}};
+  for (const auto& [from, to, low, high] : kBlocks) {
+    std::vector<Triangle> triangles = sheet();
+    add_quad(triangles, {0, from, low}, {36, from, high}, {36, to, high}, {0, to, low});
     const Plate first = read(triangles, "p"), second = read(mesh_of(first), "p");
     for (double y = 0; y <= 108; y += 0.11)
       for (double x = 0; x <= 36; x += 0.6)
