@@ -67,8 +67,7 @@ void declare(Arguments& a) {
       .writes()
       .option("mcap", "FILE",
               "keep taxels and pictures as ROS 2 messages in an MCAP file, which Foxglove, Rerun, "
-              "PlotJuggler and "
-              "ros2 bag open")
+              "PlotJuggler and ros2 bag open")
       .writes()
       .option("map", "FILE",
               "keep the surface that was felt, as far as the finger's places are known: .png, .safetensors, "
@@ -76,9 +75,8 @@ void declare(Arguments& a) {
       .writes()
       .only_with("map")
       .option("elements", "KIND",
-              "where the map shows an element, draw one of this kind: bumps, ridges, blobs, any (the one of "
-              "these "
-              "that it resembles most), or an STL file of a plate with one element in its middle")
+              "where the map shows an element, draw one of this kind: bumps, ridges, blobs, any (the one "
+              "of these that it resembles most), or an STL file of a plate with one element in its middle")
       .only_with("")
       .option("record", "DIR", "keep the signals as a recording in this folder, the next pass of its plate")
       .only_with("record")
@@ -93,9 +91,8 @@ void declare(Arguments& a) {
       .flag("probe",
             "listen to --sensor FILE, or to an address such as serial:/dev/ttyACM0@115200, udp::PORT, "
             "tcp:HOST:PORT, for --seconds (5), say what comes, and write a sensor's file to --out; with "
-            "--web the array is shown then: press a taxel, and see which one lights up; pressing all of them "
-            "in "
-            "turn writes the file's order")
+            "--web the array is shown then: press a taxel, and see which one lights up; pressing all of "
+            "them in turn writes the file's order")
       .only_with("probe")
       .flag("gain",
             "with --probe: find the gain of each taxel as well, which you press about equally hard (30 s)")

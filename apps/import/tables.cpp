@@ -233,9 +233,8 @@ void declare_tables(Arguments& arguments) {
           "what a finer sensor saw: an array [frames,height,width] (.npy), or a table of a time (s) and the "
           "pixels of an image in a row, whose clock is found from the signals; or a folder of them")
       .option("truth-times", "FILE",
-              "of --truth FILE.npy: a table with the time of each image (s), by a clock of its own, which is "
-              "found "
-              "from the signals; or a folder of them")
+              "of --truth FILE.npy: a table with the time of each image (s), by a clock of its own, which "
+              "is found from the signals; or a folder of them")
       .option("truth-range", "LOW,HIGH", "what is 0 and what is 1 in --truth", "0,1")
       .option("group", "GROUP", "person, object or day, for split group; default: the folder's name")
       .only_with("");

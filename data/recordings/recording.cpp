@@ -124,8 +124,8 @@ double Recording::began_s() const { return parse_double(value_or(metadata, "bega
 
 void restate(Recording& recording, const SignalScale& scale) {
   if (recording.signal_scale == scale) return;
-  for (float& volts : recording.signals)
-    volts = static_cast<float>(recording.signal_scale.in(scale, double{volts}));
+  for (float& signal : recording.signals)
+    signal = static_cast<float>(recording.signal_scale.in(scale, double{signal}));
   recording.signal_scale = scale;
 }
 

@@ -27,7 +27,7 @@ except ImportError as missing:
     sys.exit(77)
 
 TOPICS = {"/supertac/taxels": "std_msgs/msg/Float32MultiArray", "/supertac/picture": "sensor_msgs/msg/Image",
-          "/supertac/half_width": "sensor_msgs/msg/Image", "/supertac/total_force": "std_msgs/msg/Float32",
+          "/supertac/half_widths": "sensor_msgs/msg/Image", "/supertac/total_force": "std_msgs/msg/Float32",
           "/supertac/saturated": "std_msgs/msg/UInt32"}
 SENSOR = """{"name": "mat", "rows": 2, "columns": 3, "pitch_mm": 5, "channels": 1, "unit": "counts", "pressed": "higher",
 "range": [40, 900], "rate_hz": 100, "port": "udp::%d", "frame": {"kind": "text", "separator": ","}}"""

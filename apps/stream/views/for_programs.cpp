@@ -217,7 +217,7 @@ std::vector<McapChannel> channels_of(const TaxelArray& array, const std::string&
   const std::string loads = "1: a taxel at the end of its range";
   channels.push_back({"/supertac/total_force", "std_msgs/msg/Float32", "float32 data\n", {{"unit", loads}}});
   channels.push_back({"/supertac/saturated", "std_msgs/msg/UInt32", "uint32 data\n", {{"unit", "signals"}}});
-  if (half_widths) channels.push_back(channel("half_width", true, heights));
+  if (half_widths) channels.push_back(channel("half_widths", true, heights));
   return channels;
 }
 

@@ -57,7 +57,7 @@ class PipeOutput {
 ///   /supertac/saturated   std_msgs/msg/UInt32, as FrameLoad has them
 ///   /supertac/picture     sensor_msgs/msg/Image, 32FC1 [height][width]; without pictures the array itself,
 ///                         32FC<channels> [rows][columns]
-///   /supertac/half_width  the same, of each pixel's 90 % interval, where the model says how sure it is
+///   /supertac/half_widths the same, of each pixel's 90 % interval, where the model says how sure it is
 /// Pictures are stamped, and all messages logged, with the wall-clock time of the frame, and
 /// published with the sensor's. Metadata of a channel name the unit, the array, and the size of a pixel in
 /// mm.
