@@ -1,7 +1,8 @@
-// Ports of tests: one that says a text of its own, and one that changes what another says.
+// Ports of tests: those that say a text of their own, and one that changes what another says.
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -10,6 +11,10 @@
 #include "hardware/ports/port.h"
 
 namespace supertac {
+
+inline std::string as_text(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
 
 /// Has a clock that nothing but the test moves.
 class FakePort : public Port {
@@ -44,8 +49,33 @@ class WrappedPort : public FakePort {
   std::unique_ptr<Port> inner_;
 };
 
-inline std::string as_text(std::span<const std::byte> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
+/// A device that answers every line by a rule of its own, in a time that passes while it is read.
+class ScriptedPrinter : public FakePort {
+ public:
+  using Answer = std::function<std::string(const std::string& line)>;
+  explicit ScriptedPrinter(Answer answer, std::string always = {})
+      : answer_(std::move(answer)), always_(std::move(always)) {}
+  Received read(std::span<std::byte> buffer, double until) override {
+    now_ += always_.empty() && said_.empty() ? std::max(0.0, until - now_) : 0.01;
+    said_ += always_;
+    return hand_on(buffer);
+  }
+  double write(std::span<const std::byte> bytes, double) override {
+    const std::string text = as_text(bytes);
+    for (std::size_t at = 0; at < text.size();) {
+      const std::size_t end = std::min(text.find('\n', at), text.size());
+      if (end > at) said_ += answer_(text.substr(at, end - at));
+      at = end + 1;
+    }
+    ++writes_;
+    return now_;
+  }
+  int writes() const { return writes_; }
+
+ private:
+  Answer answer_;
+  std::string always_;
+  int writes_ = 0;
+};
 
 }  // namespace supertac

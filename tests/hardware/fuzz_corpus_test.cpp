@@ -39,43 +39,20 @@ void check_frame_decoder(std::span<const std::byte> input) {
   }
 }
 
-/// A firmware whose answers are given: every write releases the text up to the next 0 byte. Time passes only
-/// while the driver waits.
-class ScriptedFirmware : public FakePort {
- public:
-  ScriptedFirmware(std::string_view script, int polite) : script_(script), polite_(polite) { now_ = 1000; }
-  double now() override { return now_ += 1e-6; }
-  Received read(std::span<std::byte> buffer, double until) override {
-    now_ = said_.empty() ? std::max(now_, until) : now_ + 1e-3;
-    return hand_on(buffer);
-  }
-  double write(std::span<const std::byte> bytes, double) override {
-    ++writes_;
-    if (polite_-- > 0) {
-      if (as_text(bytes).find("M115") != std::string::npos)
-        said_ += "FIRMWARE_NAME:Marlin\nCap:EMERGENCY_PARSER:0\n";
-      said_ += "ok\n";
-    } else {
-      const std::size_t end = std::min(script_.find('\0'), script_.size());
-      said_ += script_.substr(0, end);
-      script_.remove_prefix(std::min(end + 1, script_.size()));
-    }
-    return now_ += 1e-3;
-  }
-  int writes() const { return writes_; }
-
- private:
-  std::string_view script_;
-  int polite_, writes_ = 0;
-};
-
-/// The first byte says how many writes are answered `ok` before the script begins. Whatever comes then, the
-/// drivers end with a result or a typed error, in bounded time, and send nothing to a firmware that has
-/// halted. Throws std::logic_error otherwise.
+/// The first byte says how many lines are answered `ok` before the script begins, which answers each with its
+/// text up to the next 0 byte. Whatever comes then, the drivers end with a result or a typed error, in
+/// bounded time, and send nothing to a firmware that has halted. Throws std::logic_error otherwise.
 void check_marlin_replies(std::span<const std::byte> input) {
   if (input.empty()) return;
-  const std::string_view script(reinterpret_cast<const char*>(input.data()) + 1, input.size() - 1);
-  ScriptedFirmware port(script, std::to_integer<int>(input[0]) % 16);
+  int polite = std::to_integer<int>(input[0]) % 16;
+  std::string script = as_text(input.subspan(1));
+  ScriptedPrinter port([&](const std::string& line) -> std::string {
+    if (polite-- > 0)
+      return line.find("M115") != line.npos ? "FIRMWARE_NAME:Marlin\nCap:EMERGENCY_PARSER:0\nok\n" : "ok\n";
+    const std::string answer = script.substr(0, script.find('\0'));
+    script.erase(0, answer.size() + 1);
+    return answer;
+  });
   Printer printer(port);
   const double begin = port.now();
   try {

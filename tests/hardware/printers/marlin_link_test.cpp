@@ -159,35 +159,6 @@ TEST(MarlinLink, ARefusedCommandIsNotSentForEver) {
   EXPECT_NO_THROW(bench.link.command("M114"));
 }
 
-/// A device that answers every line by a rule of its own, in a time that passes while it is read.
-class ScriptedPrinter : public FakePort {
- public:
-  using Answer = std::function<std::string(const std::string& line)>;
-  explicit ScriptedPrinter(Answer answer, std::string always = {})
-      : answer_(std::move(answer)), always_(std::move(always)) {}
-  Received read(std::span<std::byte> buffer, double until) override {
-    now_ += always_.empty() && said_.empty() ? std::max(0.0, until - now_) : 0.01;
-    said_ += always_;
-    return hand_on(buffer);
-  }
-  double write(std::span<const std::byte> bytes, double) override {
-    const std::string text = as_text(bytes);
-    for (std::size_t at = 0; at < text.size();) {
-      const std::size_t end = std::min(text.find('\n', at), text.size());
-      if (end > at) said_ += answer_(text.substr(at, end - at));
-      at = end + 1;
-    }
-    ++writes_;
-    return now_;
-  }
-  int writes() const { return writes_; }
-
- private:
-  Answer answer_;
-  std::string always_;
-  int writes_ = 0;
-};
-
 std::string connects(const std::string& line) { return line.starts_with("N0 ") ? "ok\n" : ""; }
 
 TEST(MarlinLink, APrinterThatAsksForLineOneForEverIsAResendLoop) {
