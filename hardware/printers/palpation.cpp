@@ -14,6 +14,7 @@ namespace supertac {
 namespace {
 
 constexpr double kLiftWithin = 60;  // in contact
+constexpr double kPollS = 0.01;     // from position to position
 constexpr const char* kHalted = "the firmware halted and takes no more commands; lift the finger by hand";
 constexpr double kLiftAgain = 0.5;  // s, behind a lift that failed
 constexpr int kMeasuredPairs = 3;   // of short moves to and fro, at the slide's speed and a slow one
@@ -230,7 +231,7 @@ void Palpation::follow(const Leg& leg) {
       if (possible && arrived) return;
       if (possible) before = *sample;
     }
-    next = std::max(next + plan_.poll_interval_s, time);
+    next = std::max(next + kPollS, time);
     if (next > time) printer_.link().idle(next - time);
   }
   throw PositionError(std::string("palpation: the head did not arrive at ") + describe(leg.to) +

@@ -25,7 +25,6 @@ struct PalpationPlan {
   double shift_x = rig::kPassShiftMm;  ///< between passes
   double lift = rig::kLiftMm;
   double speed = rig::kSlideMmS;  ///< of the slide
-  double poll_interval_s = 0.01;
   bool operator==(const PalpationPlan&) const = default;
 };
 

@@ -44,9 +44,7 @@ constexpr Point3 kLowAt{99.7, 101.17, 97.81};
 
 /// One short collection whose journal meets a fault.
 struct FaultyCollection : CollectionBench {
-  FaultyCollection()
-      : CollectionBench(running_rig({.head = kLowAt}), {.passes = 1, .slide = 2, .poll_interval_s = 0.02},
-                        kLowAt) {
+  FaultyCollection() : CollectionBench(running_rig({.head = kLowAt}), {.passes = 1, .slide = 2}, kLowAt) {
     // Simulated time would otherwise run away from the journal's thread, which would then write all at once.
     settings.progress = [](const Leg&, const Point3&, const ReaderCounters&) {
       std::this_thread::sleep_for(std::chrono::microseconds(50));
