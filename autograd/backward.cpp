@@ -99,8 +99,7 @@ Slot Backward::slot_of(std::size_t input) {
     check_gradient(x);
     return {x.grad.data(), Into::add};
   }
-  const bool has_memory = x.spare.defined() && x.spare.shape() == x.value.shape();
-  x.grad = has_memory ? std::move(x.spare) : Tensor(x.value.shape());
+  x.grad = Tensor(x.value.shape());
   return {x.grad.data(), Into::overwrite};
 }
 

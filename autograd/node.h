@@ -42,7 +42,6 @@ struct Node {
   const char* op = "leaf";
   Tensor value;
   Tensor grad;
-  Tensor spare;  // the memory of a gradient that was dropped
   std::array<Node*, kMaxInputs> inputs{};
   std::size_t input_count = 0;
   Node* next_to_delete = nullptr;

@@ -77,11 +77,6 @@ Node& Variable::checked() const {
   return *node_;
 }
 
-void Variable::drop_grad() {
-  Node& node = checked();
-  if (node.grad.defined()) node.spare = std::move(node.grad);
-}
-
 std::vector<Variable> inputs_of(const Variable& y) {
   const Node& node = y.checked();
   std::vector<Variable> inputs(node.input_count);

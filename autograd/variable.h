@@ -39,11 +39,9 @@ class Variable {
   /// dL/dv of a leaf, empty until backward() has reached it; of an op's result empty again behind its reverse
   /// step.
   const Tensor& grad() const { return checked().grad; }
-  /// To be replaced by one of value()'s shape alone: backward() and Adam refuse another.
+  /// To be replaced by one of value()'s shape, which backward() adds to, or by none, for which it writes a
+  /// new one: backward() and Adam refuse another.
   Tensor& mutable_grad() { return checked().grad; }
-  /// Empties grad() but keeps its buffer for the next gradient, which overwrites it under any Tensor that
-  /// still shares it.
-  void drop_grad();
 
   const Shape& shape() const { return value().shape(); }
   int rank() const { return value().rank(); }

@@ -54,8 +54,8 @@ class Adam {
   /// (Jordan et al. 2024; the root, which gives matrices of any shape steps of one length: Liu et al. 2025,
   /// arXiv 2502.16982, eq. 4). Its second moment stays 0.
   ///
-  /// Throws std::invalid_argument where a parameter has no gradient (after Variable::drop_grad(), backward()
-  /// has to reach it before) or one of another shape.
+  /// Throws std::invalid_argument where a parameter has no gradient (who takes it away has to run backward()
+  /// before) or one of another shape.
   ///
   /// Returns the gradient's norm before clipping, infinity when the square of the clipped one overflows
   /// `real`. When it is not finite nothing is changed: check it.
@@ -80,7 +80,8 @@ class Adam {
 };
 
 /// The learning rate at `step` (from 0) of `total`: a linear rise over `warm_up` steps to `peak`, then half a
-/// cosine down to 0 (Loshchilov & Hutter 2017, eq. 5, one period).
+/// cosine down to 0 (Loshchilov & Hutter 2017, eq. 5, one period), which it stays behind `total`; `peak` for
+/// ever where `total` is not above `warm_up`.
 struct Schedule {
   double peak = 1e-3;
   std::int64_t warm_up = 0;

@@ -152,7 +152,8 @@ void Trainer::run(MicroBatch& micro_batch) const {
   const std::vector<Parameter>& parameters = micro_batch.network.parameters();
   fill(micro_batch);
   draw_noise(micro_batch);
-  for (const Parameter& p : parameters) Variable(p.value).drop_grad();  // backward() sets the next ones
+  for (const Parameter& p : parameters)
+    Variable(p.value).mutable_grad() = Tensor();  // backward() makes others
   Statistics& statistics = micro_batch.statistics;
   std::ranges::fill(statistics.values, 0);
   statistics.targets().add(micro_batch.batch.targets);

@@ -101,7 +101,7 @@ TEST(Adam, ClipsTheNormOverAllParameters) {
 TEST(Adam, RefusesAStepWithoutAGradient) {
   Variable x = parameter(Tensor::zeros({2, 3}));
   Adam adam({x}, {});
-  x.drop_grad();
+  x.mutable_grad() = Tensor();
   EXPECT_REFUSAL("Adam: parameter 0 expects a gradient [2,3], got none; run backward() before step()",
                  adam.step());
   x.mutable_grad() = Tensor::zeros({2});
