@@ -8,11 +8,12 @@
 
 namespace supertac {
 
-/// Weighs channels: sigmoid(expand(relu(squeeze(mean over pixels)))), RCAN section 3.3. x [N,H,W,C] -> [N,C].
+/// Weighs channels: sigmoid(expand(relu(squeeze(mean over pixels)))), RCAN section 3.3, squeezed to C / 4.
+/// x [N,H,W,C] -> [N,C].
 class ChannelAttention : public Module {
  public:
-  /// Throws std::invalid_argument unless 1 <= reduction <= channels.
-  ChannelAttention(Dim channels, Dim reduction, Rng& rng);
+  /// Throws std::invalid_argument for fewer than four channels; likewise the blocks below.
+  ChannelAttention(Dim channels, Rng& rng);
   /// Each in (0,1): all near 0 or all near 1 means the block has saturated.
   Variable gates(const Variable& x) const;
 
@@ -24,8 +25,7 @@ class ChannelAttention : public Module {
 /// x [N,H,W,C] -> same.
 class Rcab : public Module {
  public:
-  /// Throws as ChannelAttention.
-  Rcab(Dim channels, Dim reduction, Rng& rng);
+  Rcab(Dim channels, Rng& rng);
   Variable forward(const Variable& x) const;
 
  private:
@@ -33,18 +33,12 @@ class Rcab : public Module {
   ChannelAttention attention_;
 };
 
-struct RirbOptions {
-  Dim channels = 32;
-  Dim reduction = 4;  ///< channel attention squeezes to channels / reduction
-  Dim blocks = 3;     ///< RCABs
-};
-
 /// Residual in residual, then twice the size: leaky_relu(up(x + conv(rcab(...rcab(x))))).
 /// x [N,H,W,C] -> [N,2H,2W,C]; up is a transposed convolution of kernel 4, stride 2, padding 1.
 class Rirb : public Module {
  public:
-  /// Throws as ChannelAttention.
-  Rirb(const RirbOptions& options, Rng& rng);
+  /// `blocks`: how many RCABs, 0 or more.
+  Rirb(Dim channels, Dim blocks, Rng& rng);
   Variable forward(const Variable& x) const;
 
  private:

@@ -263,10 +263,10 @@ std::vector<GradientCase> layer_cases() {
   cases.layer("ConvTranspose2d", ConvTranspose2d(5, 3, {.kernel = 4, .stride = 2, .padding = 1}, rng),
               {2, 3, 4, 5});
   cases.module<ChannelAttention>(
-      "ChannelAttention", std::make_shared<ChannelAttention>(8, 4, rng), uniform({2, 4, 3, 8}, 2),
+      "ChannelAttention", std::make_shared<ChannelAttention>(8, rng), uniform({2, 4, 3, 8}, 2),
       [](const ChannelAttention& m, const Variable& x) { return m.gates(x); }, 200);
-  cases.layer("Rcab", Rcab(8, 4, rng), {2, 4, 3, 8});
-  cases.layer("Rirb", Rirb({.channels = 8, .reduction = 4, .blocks = 2}, rng), {1, 3, 4, 8});
+  cases.layer("Rcab", Rcab(8, rng), {2, 4, 3, 8});
+  cases.layer("Rirb", Rirb(8, 2, rng), {1, 3, 4, 8});
   const VaeOptions vae{.timesteps = 32, .channels = 4, .latent = 3};
   cases.module<Encoder>(
       "Encoder", with_larger_weights(std::make_shared<Encoder>(vae, rng)), uniform({2, 32, 4}, 2),

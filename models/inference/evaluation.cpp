@@ -9,7 +9,7 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kBatchesAtOnce = 4;
+constexpr std::size_t kBatch = 64, kBatchesAtOnce = 4;
 
 void compute(const Ensemble& network, const WindowSet& data, std::span<const std::uint32_t> indices,
              EvaluatedBatch& part) {
@@ -37,13 +37,13 @@ void check_format(const WindowSet& windows, const SuperTac& network) {
 }
 
 void for_each_output(const Ensemble& network, const WindowSet& data, std::span<const std::uint32_t> indices,
-                     const std::function<bool(const EvaluatedBatch&)>& use, std::size_t batch) {
+                     const std::function<bool(const EvaluatedBatch&)>& use) {
   check_format(data, network.first());
-  for (std::size_t start = 0; start < indices.size(); start += batch * kBatchesAtOnce) {
+  for (std::size_t start = 0; start < indices.size(); start += kBatch * kBatchesAtOnce) {
     std::vector<EvaluatedBatch> parts;
-    const std::size_t end = std::min(indices.size(), start + batch * kBatchesAtOnce);
-    for (std::size_t first = start; first < end; first += batch) {
-      const auto count = static_cast<Dim>(std::min(batch, end - first));
+    const std::size_t end = std::min(indices.size(), start + kBatch * kBatchesAtOnce);
+    for (std::size_t first = start; first < end; first += kBatch) {
+      const auto count = static_cast<Dim>(std::min(kBatch, end - first));
       const Shape pictures = network.first().picture_shape(count);
       parts.push_back(
           {first, Tensor(network.first().input_shape(count)), Tensor(pictures), Tensor(pictures)});

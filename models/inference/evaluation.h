@@ -36,11 +36,11 @@ struct EvaluatedBatch {
   }
 };
 
-/// Calls `use` for the given windows in order, in batches of at most `batch`. `use` returns false to stop
-/// early. Batches are computed on several threads, `use` runs on the caller's. Throws as check_format.
+/// Calls `use` for the given windows in order, in batches of at most 64. `use` returns false to stop early.
+/// Batches are computed on several threads, `use` runs on the caller's. Throws as check_format.
 void for_each_output(const Ensemble& network, const WindowSet& windows,
                      std::span<const std::uint32_t> indices,
-                     const std::function<bool(const EvaluatedBatch&)>& use, std::size_t batch = 64);
+                     const std::function<bool(const EvaluatedBatch&)>& use);
 
 /// The metrics of the network's pictures of the given windows. `stop`, if given, is asked between batches;
 /// once it says true, the windows so far are what was measured. Throws as for_each_output.

@@ -86,8 +86,7 @@ Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
     : rows_(s.rows), columns_(s.columns), in_channels_(s.in_channels) {
   if (s.latents() > 0) fc_.emplace(add("fc", Linear(s.latents(), s.channels * s.rows * s.columns, rng)));
   const auto doublings = static_cast<Dim>(std::countr_zero(static_cast<std::uint64_t>(s.scale)));
-  const RirbOptions rirb{.channels = s.channels, .blocks = s.rcabs};
-  rirbs_ = add_each("rirb", doublings, [&](Dim) { return Rirb(rirb, rng); });
+  rirbs_ = add_each("rirb", doublings, [&](Dim) { return Rirb(s.channels, s.rcabs, rng); });
   out_.emplace(add("out", Conv2d(s.channels, 1, kSameSize, rng)));
   // In files the predicted error is called spread, as it was at first.
   if (s.predicted_error) predicted_error_.emplace(add("spread", Conv2d(s.channels, 1, kSameSize, rng)));

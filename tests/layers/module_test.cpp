@@ -25,9 +25,9 @@ TEST(Module, RefusesALayerWithoutInputsOrChannels) {
   Rng rng(1);
   EXPECT_REFUSAL("uniform_fan_in: shape expects an input and a kernel of 1 or more, got [0,0,3,8]",
                  Conv2d(3, 8, {.kernel = 0}, rng));
-  EXPECT_REFUSAL("ChannelAttention: reduction expects 1 to the 4 channels, got 8",
-                 ChannelAttention(4, 8, rng));
-  EXPECT_NO_THROW(ChannelAttention(4, 4, rng));
+  EXPECT_REFUSAL("uniform_fan_in: shape expects an input and a kernel of 1 or more, got [0,3]",
+                 ChannelAttention(3, rng));
+  EXPECT_NO_THROW(ChannelAttention(4, rng));
 }
 
 }  // namespace supertac::module_test

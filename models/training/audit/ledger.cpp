@@ -19,20 +19,6 @@ constexpr const char* kFormat = "supertac-ledger-2";
 constexpr JsonLimits kLimits{.max_bytes = std::size_t{4} << 20};
 
 constexpr std::string_view kChain = ",\"chain\":\"", kStep = "{\"step\":";
-constexpr std::size_t kHashDigits = 64;
-
-// A line in its parts, without looking at its tensors: of a long training there are gigabytes. Nothing when
-// it is none.
-std::optional<Ledger::Line> line_in(const std::string& text) {
-  const std::size_t cut = text.rfind(kChain);
-  Ledger::Line line{0, {}, text};
-  if (!text.starts_with(kStep) || cut == std::string::npos ||
-      text.size() != cut + kChain.size() + kHashDigits + 2 ||
-      std::from_chars(text.data() + kStep.size(), text.data() + cut, line.step).ec != std::errc())
-    return std::nullopt;
-  line.chain = text.substr(cut + kChain.size(), kHashDigits);
-  return line;
-}
 
 }  // namespace
 
@@ -75,13 +61,17 @@ Ledger Ledger::read(const std::string& path) {
   std::string chain = sha256(text);
   while (std::getline(in, text)) {
     if (in.eof()) break;  // torn off in the middle: the run was killed as it wrote
-    std::optional<Line> line = line_in(text);
-    if (!line) throw FileError(path, none);
-    chain = sha256(chain + text.substr(0, text.rfind(kChain)) + "}");
-    if (line->chain != chain)
-      throw FileError(path, "step " + std::to_string(line->step) +
+    // Without a look at its tensors: of a long training there are gigabytes.
+    const std::size_t cut = text.rfind(kChain);
+    Line line{0, text};
+    if (!text.starts_with(kStep) || cut == std::string::npos ||
+        std::from_chars(text.data() + kStep.size(), text.data() + cut, line.step).ec != std::errc())
+      throw FileError(path, none);
+    chain = sha256(chain + text.substr(0, cut) + "}");
+    if (text.substr(cut + kChain.size()) != chain + "\"}")
+      throw FileError(path, "step " + std::to_string(line.step) +
                                 ": the chain is broken; a line was changed after it had been written");
-    ledger.lines.push_back(std::move(*line));
+    ledger.lines.push_back(std::move(line));
   }
   return ledger;
 }

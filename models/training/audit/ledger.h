@@ -31,7 +31,7 @@ struct Ledger {
   std::vector<std::string> names;  ///< of the tensors
   struct Line {
     std::int64_t step;
-    std::string chain, text;
+    std::string text;
   };
   std::vector<Line> lines;
 
