@@ -1,4 +1,5 @@
-// Elementwise non-linearities; any shape. What throws, throws std::invalid_argument.
+// Elementwise non-linearities; y has the shape of x, any. All throw std::invalid_argument for an empty
+// Variable.
 #pragma once
 
 #include "autograd/variable.h"

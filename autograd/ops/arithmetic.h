@@ -5,8 +5,8 @@
 
 namespace supertac {
 
-/// y[i] = a[i] + b[i], a[i] - b[i], a[i] b[i]; nothing is broadcast. All throw std::invalid_argument unless
-/// the shapes are equal.
+/// y[i] = a[i] + b[i], a[i] - b[i], a[i] b[i]; nothing is broadcast. They throw std::invalid_argument unless
+/// the shapes are equal, and all ops here for an empty Variable.
 Variable operator+(const Variable& a, const Variable& b);
 Variable operator-(const Variable& a, const Variable& b);
 Variable operator*(const Variable& a, const Variable& b);

@@ -9,9 +9,9 @@
 namespace supertac {
 
 struct ConvOptions {
-  Dim stride = 1;
-  Dim padding = 0;                      // zeros on every side
-  real negative_slope = kNoActivation;  // of the activation f(s) = s for s > 0, else negative_slope s
+  Dim stride = 1;                       // 1 to 4096
+  Dim padding = 0;                      // zeros on every side, 0 to 4096
+  real negative_slope = kNoActivation;  // of f(s) = s for s > 0, else negative_slope s; 0 or more
 };
 
 /// y[n,l,o] = f(b[o] + sum over k, i of x[n, l stride + k - padding, i] w[k,i,o])

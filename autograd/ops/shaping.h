@@ -15,11 +15,13 @@ Variable max_pool2d(const Variable& x);
 
 /// Joins along the last axis: [.., a], [.., b] -> [.., a + b]. Up to 8 inputs; all other axes must agree.
 Variable concat(std::span<const Variable> xs);
-/// Which columns of [.., width] take_runs() takes: from `first` on, runs of `run`, `step` apart.
+/// Which columns take_runs() takes: from `first` on, runs of `run`, `step` apart; `width` of them, which is a
+/// multiple of `run`. first >= 0, 1 <= run <= step, and x has all these columns.
 struct Runs {
-  Dim first, run, step, width;  // width of the result: a multiple of run
+  Dim first, run, step, width;
 };
-/// y[.., k] = x[.., first + k / run * step + k % run]. No gradient: throws for an x that requires one.
+/// y[.., k] = x[.., first + k / run * step + k % run]: [.., columns] -> [.., width]. No gradient: throws for
+/// an x that requires one.
 Variable take_runs(const Variable& x, const Runs& runs);
 /// Windows [N,T,S] -> their last frames [N,rows,columns,channels], S = rows columns channels. No gradient:
 /// throws for windows that require one.

@@ -43,8 +43,9 @@ class Compiled {
   void* library_ = nullptr;
 };
 
-bool has_compiler(const std::string& name = "cc") {
-  return std::system((name + " --version > /dev/null 2>&1").c_str()) == 0;
+// The compiler with which a command begins.
+bool has_compiler(const std::string& words = "cc") {
+  return std::system((words.substr(0, words.find(' ')) + " --version > /dev/null 2>&1").c_str()) == 0;
 }
 
 // What the header says that self_test() returns.
@@ -84,7 +85,7 @@ TEST(CCode, DrawsTheBitsOfACompiledModel) {
          {"cc -Og", "cc -O1", "cc -O2", "cc -Os", "cc -O3 -march=native",
           "cc -O2 -march=native -ffp-contract=fast", "clang -O2", "clang -O3 -march=native",
           "cc -O1 -fsanitize=undefined -fno-sanitize-recover"}) {
-      if (!has_compiler(std::string(flags).substr(0, std::string(flags).find(' ')))) continue;
+      if (!has_compiler(flags)) continue;
       const ModelFile file = model_of(settings, {});
       const CCode exported = c_code_of(file, "finger", 100);
       const Compiled code(exported, flags);
@@ -167,7 +168,7 @@ TEST(CCode, RefusesACompilerThatRearrangesSums) {
   const CCode exported = c_code_of(model_of(tiny(), {}), "finger", 100);
   for (const std::string words :
        {"cc -O2 -ffast-math", "cc -Ofast", "cc -O2 -ffinite-math-only", "clang -O1 -ffast-math"}) {
-    if (!has_compiler(words.substr(0, words.find(' ')))) continue;
+    if (!has_compiler(words)) continue;
     EXPECT_ERROR(Compiled(exported, words), std::runtime_error, "takes frames that are no numbers");
   }
   CCode quiet = exported;
@@ -190,7 +191,7 @@ TEST(CCode, SeveralModelsFitIntoOneUnit) {
       {"palm.c", palm.source},
       {"unit.c", "#include \"finger.c\"\n#include \"palm.c\"\n"}};
   for (const std::string words : {"cc -O2", "clang -O2"}) {
-    if (!has_compiler(words.substr(0, words.find(' ')))) continue;
+    if (!has_compiler(words)) continue;
     const Compiled unit(finger, words, more);
     std::vector<float> picture(256), predicted_error(256);
     for (int turn = 0; turn < 2; ++turn) {

@@ -56,35 +56,23 @@ void product(const ProductJob& job, const real* x, real* y) {
                           : in_tiles<kTilePixels, 4, 2, 1>(pixels, tile);
 }
 
-// A vector of channels of a map that may be the last, partial one.
-struct Lanes {
-  Dim count;
-  ALWAYS_INLINE Vec load(const real* p) const {
-    return count < Vec::kLanes ? Vec::load_part(p, count) : Vec::load(p);
-  }
-  ALWAYS_INLINE void store(Vec v, real* p) const {
-    count < Vec::kLanes ? v.store_part(p, count) : v.store(p);
-  }
-};
-
+// Calls work(image, channel, that vector of channels) for all vectors of all images.
 template <class Work>
 ALWAYS_INLINE void for_each_vector(const MapJob& job, Work work) {
-  for (Dim image = 0; image < job.images; ++image) {
-    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
-      work(image, c, Lanes{job.channels - c < Vec::kLanes ? job.channels - c : Vec::kLanes});
-    }
-  }
+  for (Dim image = 0; image < job.images; ++image)
+    in_vectors<1>(job.channels, [&]<int J, bool kPartial>(Dim c)
+                                    INLINED { work(image, c, Outputs<J, kPartial>(job.channels, c)); });
 }
 
 void gate(const MapJob& job, const real* a, const real* x, const real* gates, real* y) {
-  for_each_vector(job, [&](Dim image, Dim c, Lanes lanes) INLINED {
-    const Vec factor = gates ? lanes.load(gates + image * job.channels + c) : Vec::broadcast(1);
+  for_each_vector(job, [&](Dim image, Dim c, auto channels) INLINED {
+    const Vec factor = gates ? channels.load(gates + image * job.channels + c, 0) : Vec::broadcast(1);
     for (Dim i = 0; i < job.height; ++i) {
       const real* from = a + image * job.a.image + i * job.a.line + c;
       const real* change = x + image * job.x.image + i * job.x.line + c;
       real* to = y + image * job.y.image + i * job.y.line + c;
       for (Dim j = 0; j < job.width; ++j) {
-        lanes.store(Vec::fma(lanes.load(change), factor, lanes.load(from)), to);
+        channels.store(Vec::fma(channels.load(change, 0), factor, channels.load(from, 0)), to, 0);
         from += job.a.pixel, change += job.x.pixel, to += job.y.pixel;
       }
     }
@@ -93,13 +81,13 @@ void gate(const MapJob& job, const real* a, const real* x, const real* gates, re
 
 void mean(const MapJob& job, const real* x, real* to) {
   const Vec share = Vec::broadcast(1 / static_cast<real>(job.height * job.width));
-  for_each_vector(job, [&](Dim image, Dim c, Lanes lanes) INLINED {
+  for_each_vector(job, [&](Dim image, Dim c, auto channels) INLINED {
     Vec sum = Vec::broadcast(0);
     for (Dim i = 0; i < job.height; ++i) {
       const real* from = x + image * job.x.image + i * job.x.line + c;
-      for (Dim j = 0; j < job.width; ++j, from += job.x.pixel) sum = Vec::add(sum, lanes.load(from));
+      for (Dim j = 0; j < job.width; ++j, from += job.x.pixel) sum = Vec::add(sum, channels.load(from, 0));
     }
-    lanes.store(Vec::fma(sum, share, Vec::broadcast(0)), to + image * job.channels + c);
+    channels.store(Vec::fma(sum, share, Vec::broadcast(0)), to + image * job.channels + c, 0);
   });
 }
 
