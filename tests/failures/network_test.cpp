@@ -54,7 +54,7 @@ double growth(int depth, bool safeguards) {
   const Tensor input = Tensor::of({4, 8, 8, 16}, normal_eps(4 * 64, 16, 1)[0].values());
   Variable h(input);
   for (int i = 0; i < depth; ++i) {
-    const Rcab block(16, 4, rng);
+    const Rcab block(16, rng);
     for (const Parameter& p : block.parameters()) {
       if (safeguards) continue;
       if (p.name == "attention.expand.bias") Variable(p.value).mutable_value().fill(50);  // gates of 1
@@ -79,7 +79,7 @@ TEST(Failures, F9DeepStacksOfResidualBlocksBlowUpWithLargerWeights) {
 TEST(Failures, F10SaturatedGatesLeaveTheSkip) {
   for (const real bias : {real(-100), real(100)}) {
     Rng rng(2);
-    const Rcab block(8, 4, rng);
+    const Rcab block(8, rng);
     Variable expand;
     for (const Parameter& p : block.parameters()) {
       if (p.name == "attention.expand.bias") (expand = p.value).mutable_value().fill(bias);
@@ -97,7 +97,7 @@ TEST(Failures, F10SaturatedGatesLeaveTheSkip) {
 
 TEST(Failures, F10GatesBeginFarFromSaturation) {
   Rng rng(3);
-  const ChannelAttention attention(32, 4, rng);
+  const ChannelAttention attention(32, rng);
   for (const real g : attention.gates(Variable(uniform({4, 4, 4, 32}, 1))).value().values()) {
     EXPECT_GT(g, 0.2);
     EXPECT_LT(g, 0.8);
