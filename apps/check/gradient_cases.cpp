@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <memory>
 #include <optional>
 
 #include "autograd/ops/arithmetic.h"
@@ -52,32 +51,25 @@ class Cases {
     options.names = inputs;
     for (std::string& input : options.names)
       input = name + " " + input + (settings.empty() ? "" : " (" + settings + ")");
-    cases_.push_back(
-        {kind_, name, [f, leaves] { return f(leaves); }, leaves, std::move(options), f, is_weight});
+    cases_.push_back({kind_, name, f, leaves, std::move(options), is_weight});
   }
 
-  // The parameters asked for, and x where it has a gradient.
-  template <class M>
-  void module(
-      const std::string& name, std::shared_ptr<M> m, const std::optional<Tensor>& x,
-      const std::function<Variable(const M&, const Variable&)>& f, Dim most,
-      const std::function<bool(const Parameter&)>& asked = [](const Parameter&) { return true; }) {
-    std::vector<Parameter> parameters;
-    std::copy_if(m->parameters().begin(), m->parameters().end(), std::back_inserter(parameters), asked);
+  // f of x, or of nothing: the gradients of the parameters, and of x.
+  void module(const std::string& name, const std::vector<Parameter>& parameters,
+              const std::optional<Tensor>& x, const std::function<Variable(const Variable&)>& f, Dim most) {
     Leaves leaves = values_of(parameters);
     GradientCheckOptions options{.max_entries_per_input = most};
     for (const Parameter& parameter : parameters) options.names.push_back(parameter.name);
     const Variable input = x ? Variable(*x, true) : Variable();
     if (x) leaves.push_back(input), options.names.push_back("x");
     for (std::string& leaf : options.names) leaf = name + " " + leaf;
-    cases_.push_back({kind_, name, [=] { return f(*m, input); }, leaves, std::move(options), {}, {}});
+    cases_.push_back({kind_, name, [=](const Leaves&) { return f(input); }, leaves, std::move(options), {}});
   }
 
   template <class M>
-  void layer(const std::string& name, const M& made, const Shape& x) {
-    module<M>(
-        name, std::make_shared<M>(made), uniform(x, 2),
-        [](const M& m, const Variable& input) { return m.forward(input); }, 200);
+  void layer(const std::string& name, const M& m, const Shape& x, Dim most = 200) {
+    module(
+        name, m.parameters(), uniform(x, 2), [m](const Variable& input) { return m.forward(input); }, most);
   }
 
   std::vector<GradientCase> take() { return std::move(cases_); }
@@ -226,8 +218,8 @@ void losses(Cases& cases) {
 // At the initial weights the deepest gradients are 1e-10 of the loss, below what a difference of doubles
 // resolves.
 template <class M>
-std::shared_ptr<M> with_larger_weights(std::shared_ptr<M> model) {
-  for (Variable v : values_of(model->parameters())) {
+M with_larger_weights(const M& model) {
+  for (Variable v : values_of(model.parameters())) {
     if (v.rank() < 2) continue;
     for (real& w : v.mutable_value().values()) w *= real(2.2);
   }
@@ -243,13 +235,14 @@ void supertac_losses(Cases& cases, const std::string& name, const SuperTacSettin
   std::vector<Tensor> eps;
   for (Dim i = 0; i < s.groups(); ++i)
     eps.push_back(uniform({2, s.latent}, 3 + static_cast<std::uint64_t>(i), 0, 1));
-  const auto loss = [=](const SuperTac& model, const Variable&) {
+  const SuperTac model = with_larger_weights(SuperTac(s, rng));
+  std::vector<Parameter> asked = model.parameters();
+  if (s.predicted_error)
+    std::erase_if(asked, [](const Parameter& p) { return !p.name.starts_with("upsampler.spread."); });
+  const auto loss = [=](const Variable&) {
     return supertac_loss(model.forward(windows, eps), truth, {.a = 0.5, .beta = 0.01, .lambda = 0.3}).total;
   };
-  const auto asked = [&](const Parameter& p) {
-    return !s.predicted_error || p.name.starts_with("upsampler.spread.");
-  };
-  cases.module<SuperTac>(name, with_larger_weights(std::make_shared<SuperTac>(s, rng)), {}, loss, 4, asked);
+  cases.module(name, asked, {}, loss, 4);
 }
 
 std::vector<GradientCase> layer_cases() {
@@ -262,22 +255,20 @@ std::vector<GradientCase> layer_cases() {
               {2, 5, 5});
   cases.layer("ConvTranspose2d", ConvTranspose2d(5, 3, {.kernel = 4, .stride = 2, .padding = 1}, rng),
               {2, 3, 4, 5});
-  cases.module<ChannelAttention>(
-      "ChannelAttention", std::make_shared<ChannelAttention>(8, rng), uniform({2, 4, 3, 8}, 2),
-      [](const ChannelAttention& m, const Variable& x) { return m.gates(x); }, 200);
+  const ChannelAttention attention(8, rng);
+  cases.module(
+      "ChannelAttention", attention.parameters(), uniform({2, 4, 3, 8}, 2),
+      [=](const Variable& x) { return attention.gates(x); }, 200);
   cases.layer("Rcab", Rcab(8, rng), {2, 4, 3, 8});
   cases.layer("Rirb", Rirb(8, 2, rng), {1, 3, 4, 8});
   const VaeOptions vae{.timesteps = 32, .channels = 4, .latent = 3};
-  cases.module<Encoder>(
-      "Encoder", with_larger_weights(std::make_shared<Encoder>(vae, rng)), uniform({2, 32, 4}, 2),
-      [](const Encoder& m, const Variable& x) {
-        const LatentDistribution latent = m.forward(x);
-        return concat(std::array{latent.mean, latent.log_var});
-      },
-      20);
-  cases.module<Decoder>(
-      "Decoder", with_larger_weights(std::make_shared<Decoder>(vae, rng)), uniform({2, 3}, 2),
-      [](const Decoder& m, const Variable& z) { return m.forward(z); }, 20);
+  const Encoder encoder = with_larger_weights(Encoder(vae, rng));
+  const auto encode = [=](const Variable& x) {
+    const LatentDistribution latent = encoder.forward(x);
+    return concat(std::array{latent.mean, latent.log_var});
+  };
+  cases.module("Encoder", encoder.parameters(), uniform({2, 32, 4}, 2), encode, 20);
+  cases.layer("Decoder", with_larger_weights(Decoder(vae, rng)), {2, 3}, 20);
   cases.layer("TextureClassifier", TextureClassifier({.height = 8, .width = 8, .classes = 3}, rng),
               {2, 8, 8, 1});
   return cases.take();

@@ -13,11 +13,15 @@ namespace supertac {
 struct GradientCase {
   std::string kind;  ///< "op", "layer" or "loss"
   std::string name;  ///< of an op the name that it records: "conv2d"
-  std::function<Variable()> f;
+  /// Of these leaves; that of an op takes others as well.
+  std::function<Variable(const std::vector<Variable>&)> f;
   std::vector<Variable> leaves;
   GradientCheckOptions options{};
-  std::function<Variable(const std::vector<Variable>&)> of{};  ///< of an op: f of any leaves
   std::vector<bool> is_weight{};  ///< of an op, for each leaf: its size does not follow the number of rows
+
+  GradientReport check() const {
+    return check_gradients([this] { return f(leaves); }, leaves, options);
+  }
 };
 
 /// All of them, and those of ops alone. Cases of one name follow each other.

@@ -45,7 +45,7 @@ int run(Arguments& a) {
     for (const std::string& name = row["name"].get_ref<std::string&>(); c != cases.end() && c->name == name;
          progress.update(static_cast<std::uint64_t>(++c - cases.begin()))) {
       stop_if_interrupted();
-      const GradientReport report = check_gradients(c->f, c->leaves, c->options);
+      const GradientReport report = c->check();
       if (entries == 0 || report.max_relative_error > worst.relative_error) worst = report.worst.front();
       if (report.wrong > 0) reports.push_back(report.text());
       entries += report.entries;

@@ -13,11 +13,11 @@ TEST(OpGradients, AnInputHasTheSameOneWhereAllOthersAreConstants) {
   for (const GradientCase& c : op_cases()) {
     std::vector<Variable> all;
     for (const Variable& leaf : c.leaves) all.emplace_back(leaf.value(), true);
-    backward(sum(c.of(all)));
+    backward(sum(c.f(all)));
     for (std::size_t i = 0; i < all.size(); ++i) {
       std::vector<Variable> one;
       for (std::size_t k = 0; k < all.size(); ++k) one.emplace_back(all[k].value(), k == i);
-      backward(sum(c.of(one)));
+      backward(sum(c.f(one)));
       EXPECT_TRUE(std::ranges::equal(one[i].grad().values(), all[i].grad().values())) << c.options.names[i];
     }
   }
@@ -35,7 +35,7 @@ TEST(OpGradients, OfNoRowsAreEmptyOrAllZero) {
       leaves.emplace_back(Tensor::zeros(Shape(none)), true);
     }
     try {
-      backward(sum(c.of(leaves)));
+      backward(sum(c.f(leaves)));
     } catch (const std::invalid_argument& error) {  // a mean of nothing, or a constant of other rows
       const std::string said = error.what();
       EXPECT_TRUE(said.starts_with(c.name + ": ") && said.find(" expects ") != std::string::npos &&
@@ -58,7 +58,7 @@ TEST(OpGradients, AnEmptyVariableIsRefusedByName) {
     for (std::size_t i = 0; i < c.leaves.size(); ++i) {
       std::vector<Variable> leaves = c.leaves;
       leaves[i] = Variable();
-      const std::string said = what_of<std::invalid_argument>([&] { c.of(leaves); });
+      const std::string said = what_of<std::invalid_argument>([&] { c.f(leaves); });
       EXPECT_TRUE(said.starts_with(c.name + ": ")) << said;
       EXPECT_TRUE(said.ends_with(" expects a value, got an empty Variable"))
           << c.options.names[i] << ", " << said;
@@ -98,7 +98,7 @@ TEST(OpGradients, APlantedErrorIsFoundAndNamed) {
         if (kind == Planted::index && c.name == "sum") continue;  // the same number at every index
         Planted plant;
         plant.op = c.name, plant.input = input, plant.kind = kind;
-        const GradientReport report = check_gradients(c.f, c.leaves, c.options);
+        const GradientReport report = c.check();
         EXPECT_GT(report.wrong, 0) << c.options.names[input] << ", " << kind;
         EXPECT_TRUE(report.worst.front().place.starts_with(c.options.names[input])) << report.text();
       }

@@ -37,13 +37,7 @@ inline std::array<Tensor, kGroups> normal_eps(Dim n, Dim latent, std::uint64_t s
 }
 
 inline SuperTacSettings small_settings() {
-  SuperTacSettings s;
-  s.timesteps = 32;
-  s.latent = 3;
-  s.scale = 2;
-  s.channels = 8;
-  s.rcabs = 1;
-  return s;
+  return {.timesteps = 32, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1};
 }
 
 inline SuperTac random_network(const SuperTacSettings& settings = small_settings(), std::uint64_t seed = 1) {
@@ -70,10 +64,7 @@ inline Recipe small_training() {
 /// change each.
 inline WindowSet small_windows(const SuperTacSettings& model, std::size_t frames = 150,
                                const std::function<void(Recording&)>& spoil = {}) {
-  WindowSettings settings;
-  settings.timesteps = static_cast<int>(model.timesteps);
-  settings.scale = static_cast<int>(model.scale);
-  WindowSet windows(settings);
+  WindowSet windows({.timesteps = static_cast<int>(model.timesteps), .scale = static_cast<int>(model.scale)});
   const Plate plate = Plate::named("3_Bumps");
   for (int trial = 1; trial <= 2; ++trial) {
     Recording r;
@@ -105,9 +96,6 @@ struct SmallTraining {
   Trainer trainer() const { return {windows, all_of(windows), recipe}; }
 };
 
-inline std::string file_text(const std::string& path) {
-  const std::vector<std::byte> bytes = read_file(path, 1 << 26);
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
+inline std::string file_text(const std::string& path) { return read_text_file(path, 1 << 26); }
 
 }  // namespace supertac
