@@ -265,16 +265,14 @@ struct Moments {
 Baseline ridge(const WindowSet& windows, std::span<const std::uint32_t> train, const FitProgress& progress) {
   const std::vector<std::uint32_t> chosen = fitted_on(train);
   // Whole passes judge the penalty, since neighbours of one pass are nearly the same.
-  const auto begins_pass = [&](std::size_t n) {
-    return n > 0 && windows.pass_of(chosen[n]) != windows.pass_of(chosen[n - 1]);
-  };
-  std::size_t passes = 1, pass = 0;
-  for (std::size_t n = 0; n < chosen.size(); ++n) passes += begins_pass(n) ? 1 : 0;
+  std::vector<std::size_t> pass = {0};  // of each window, counted
+  for (std::size_t n = 1; n < chosen.size(); ++n)
+    pass.push_back(pass.back() + (windows.pass_of(chosen[n]) != windows.pass_of(chosen[n - 1]) ? 1 : 0));
+  const std::size_t passes = pass.back() + 1;
   std::vector<std::uint32_t> fit, judge;
   for (std::size_t n = 0; n < chosen.size(); ++n) {
-    pass += begins_pass(n) ? 1 : 0;
     const bool held = passes == 1 ? n >= chosen.size() - chosen.size() / kHeldOut
-                                  : pass % kHeldOut == std::min(kHeldOut, passes) - 1;
+                                  : pass[n] % kHeldOut == std::min(kHeldOut, passes) - 1;
     (held ? judge : fit).push_back(chosen[n]);
   }
   const std::size_t signals = windows.array().signals(), size = windows.frames() * signals,

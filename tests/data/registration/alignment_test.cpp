@@ -91,14 +91,10 @@ TEST(Alignment, ALongLossThatLeftNoStepIsFound) {
     const double before = scatter(passes);
     auto& [recording, registration] = passes[which];
     const std::size_t lost = 400, at = quiet_place(recording, lost);
-    const auto from = static_cast<std::ptrdiff_t>(at), to = static_cast<std::ptrdiff_t>(at + lost);
-    recording.signals.erase(recording.signals.begin() + from * rig::kTaxels,
-                            recording.signals.begin() + to * rig::kTaxels);
-    recording.position_mm.erase(recording.position_mm.begin() + from * 2,
-                                recording.position_mm.begin() + to * 2);
-    const double missing_s = recording.time_s[at + lost] - recording.time_s[at];
-    recording.time_s.erase(recording.time_s.begin() + from, recording.time_s.begin() + to);
-    for (std::size_t i = at; i < recording.frames(); ++i) recording.time_s[i] -= missing_s;
+    const std::vector<double> time = recording.time_s;
+    const double missing_s = time[at + lost] - time[at];
+    lose(recording, at, lost);
+    for (std::size_t i = at; i < recording.frames(); ++i) recording.time_s[i] = time[i + lost] - missing_s;
     EXPECT_GT(scatter(passes), before + 0.3) << which;
     align(passes);
     EXPECT_NEAR(registration.lost_s, missing_s, 0.11) << which;
