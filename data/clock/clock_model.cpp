@@ -9,6 +9,28 @@ namespace supertac {
 
 using namespace clock_model;
 
+constexpr double kSteady = 2e-4;  // a period stays so
+constexpr double kSure = 18;      // median deviations
+constexpr double kDense = 0.15;   // losses of fewer frames may go on all the time
+
+double clock_model::span_s(double jitter_s, double unit_s) {
+  return unit_s > 0 ? kReads * unit_s : std::clamp(kReads * jitter_s, 0.25, 2.0);
+}
+
+bool clock_model::for_good(std::size_t reads, double seconds, double rise_s, double jitter_s) {
+  const double alone =
+      std::min({static_cast<double>(reads), 1.0 * kReads, 1 + seconds / std::max(jitter_s, 1e-9)});
+  return reads >= kWitnesses && alone * rise_s > kDecades * jitter_s;
+}
+
+Rate clock_model::doubted(Rate found, double stated_s, double tolerance, double jitter_s) {
+  const double off = found.period_s / stated_s;
+  if (tolerance < kKnown || jitter_s < 0.25 * found.period_s) return found;
+  const bool stated = off > 1 && off * (1 - kDense) < 1;
+  found.uncertain = std::max(found.uncertain, stated ? 1 - (1 - kSteady) / off : kDense);
+  return found;
+}
+
 Rate clock_model::slope_of(std::span<const ReadEnd> ends, double period_s, double farthest, double unit_s) {
   const std::size_t each = std::clamp<std::size_t>(ends.size() / 16, 1, 8), blocks = ends.size() / each;
   std::vector<ReadEnd> points;

@@ -102,13 +102,10 @@ namespace clock_model {
 
 // The assumptions above.
 constexpr std::size_t kReads = 16;
-constexpr double kSteady = 2e-4;
 constexpr double kDecades = 13;   // what has a chance of so many does not happen
 constexpr double kOldestS = 0.6;  // a frame waited no longer before anything is known; stamps jump no farther
 constexpr double kNever = 1e18, kMostStampS = 1e10;
-constexpr double kSure = 18;           // median deviations
 constexpr std::size_t kWitnesses = 3;  // reads, or stamps, in a row that bear each other out
-constexpr double kDense = 0.15;
 constexpr double kKnown = 0.05;        // a rate that is surer tells what was lost
 constexpr double kClockDrifts = 0.01;  // at most, from the port's
 
@@ -134,29 +131,17 @@ inline double shortest(const Rate& rate) { return rate.period_s * (1 - std::min(
 
 /// So long (s) must reads go on, whose delays are `jitter_s`, until one was on time: those that come sooner
 /// after one another than they are late are late together.
-inline double span_s(double jitter_s, double unit_s) {
-  return unit_s > 0 ? kReads * unit_s : std::clamp(kReads * jitter_s, 0.25, 2.0);
-}
+double span_s(double jitter_s, double unit_s);
 
 /// Whether so many reads in a row, `seconds` in all, are late by `rise_s` for good: of those that are later
 /// than `jitter_s`, which one in ten is, one in ten is later than twice that.
-inline bool for_good(std::size_t reads, double seconds, double rise_s, double jitter_s) {
-  const double alone =
-      std::min({static_cast<double>(reads), 1.0 * kReads, 1 + seconds / std::max(jitter_s, 1e-9)});
-  return reads >= kWitnesses && alone * rise_s > kDecades * jitter_s;
-}
+bool for_good(std::size_t reads, double seconds, double rise_s, double jitter_s);
 
 /// What a measured period is worth where nothing but the file's rate says whether frames are lost all the
-/// time, which makes it too long: a stated one that is shorter by less than kDense is the period then, and
+/// time, which makes it too long: a stated one that is shorter by less than 15 % is the period then, and
 /// one that is another's says nothing. Losses show one by one where frames are late by less than a quarter of
 /// a period.
-inline Rate doubted(Rate found, double stated_s, double tolerance, double jitter_s) {
-  const double off = found.period_s / stated_s;
-  if (tolerance < kKnown || jitter_s < 0.25 * found.period_s) return found;
-  const bool stated = off > 1 && off * (1 - kDense) < 1;
-  found.uncertain = std::max(found.uncertain, stated ? 1 - (1 - kSteady) / off : kDense);
-  return found;
-}
+Rate doubted(Rate found, double stated_s, double tolerance, double jitter_s);
 
 /// By so much the stamps of a coarse clock wander against the frames.
 inline double grain(double unit_s, double period_s) {
