@@ -60,14 +60,10 @@ TEST(Activations, MinusInfinityIsRectifiedToZero) {
   }
 }
 
-TEST(Activations, RefusesBadSettings) {
-  const Variable x(Tensor::zeros({1}));
+TEST(Activations, AndOpsThatEndInOneRefuseBadSettings) {
+  const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
   EXPECT_REFUSAL("leaky_relu: negative_slope expects 0 or more, got -0.5", leaky_relu(x, real(-0.5)));
   EXPECT_REFUSAL("clamp: low expects at most high, 1, got 2", clamp(x, 2, 1));
-}
-
-TEST(Activations, OpsThatEndInOneRefuseANegativeSlope) {
-  const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
   EXPECT_REFUSAL("linear: negative_slope expects 0 or more, got -0.5", linear(x, w, b, real(-0.5)));
   const Variable line(Tensor::zeros({1, 4, 3})), taps(Tensor::zeros({3, 3, 5}));
   EXPECT_REFUSAL("conv1d: negative_slope expects 0 or more, got -0.5",

@@ -22,14 +22,6 @@ TEST(SuperTac, PresetPaperHasTheParametersOfTheTable) {
   }
 }
 
-TEST(SuperTac, PicturesOfAllSizes) {
-  for (const Dim scale : {2, 4, 8}) {
-    SuperTacSettings s = small_settings();
-    s.scale = scale;
-    EXPECT_EQ(random_network(s).infer(uniform({2, 32, 16}, 1)).shape(), (Shape{2, 4 * scale, 4 * scale, 1}));
-  }
-}
-
 // No VAEs: the last frame's way alone, for arrays and pictures that windows do not have.
 TEST(SuperTac, SingleFramesOfAnyArrayAtEveryScale) {
   for (const Dim scale : {2, 4, 8, 16}) {
