@@ -74,12 +74,10 @@ bool cycles(const std::vector<double>& v) {
   return false;
 }
 
-/// The unit in which so many frames take `seconds`, to a quarter; 0: in none.
-double unit_live(double step, std::size_t frames, double seconds) {
-  for (const double unit : {1.0, 1e-3, 1e-6, 1e-9}) {
-    const double ratio = step * unit * static_cast<double>(frames - 1) / seconds;
-    if (ratio > 0.75 && ratio < 1.25) return unit;
-  }
+/// The unit in which so much is `seconds`, to a quarter, or to `least` of them; 0: in none.
+double unit_live(double went, double seconds, double least = 0.75) {
+  for (const double unit : {1.0, 1e-3, 1e-6, 1e-9})
+    if (const double ratio = went * unit / seconds; ratio > least && ratio < 1.25) return unit;
   return 0;
 }
 
@@ -171,7 +169,8 @@ SlotRole role_of(TextGrammar& g, std::size_t c, double seconds, bool clock) {
   if (counts(v)) return {SlotRole::counter, "rises by one"};
   if (const double step = finite ? steady_step(v) : 0; step > 0) {
     // Of one that runs over, or beside another clock, arrival says the unit; in a file its step does.
-    const double unit = live ? unit_live(step, v.size(), seconds) : unit_of_step(step, whole(v));
+    const double unit =
+        live ? unit_live(step * static_cast<double>(v.size() - 1), seconds) : unit_of_step(step, whole(v));
     if (unit == 0 && !clock)
       g.doubt = "slot " + std::to_string(c) + " rises by about " + format(step, 3) +
                 " a frame, which is time in no unit (s, ms, us, ns): a clock, or a signal that only rose";
@@ -339,10 +338,7 @@ std::optional<double> unit_of_clock(std::span<const double> stamps, double secon
     return unit > 0 ? std::optional(unit) : std::nullopt;
   }
   for (const double jump : {0.0, longest})
-    for (const double unit : {1.0, 1e-3, 1e-6}) {
-      const double ratio = (went - jump) * unit / seconds;
-      if (ratio > (fell > 0 ? 0.3 : 0.75) && ratio < 1.25) return unit;
-    }
+    if (const double unit = unit_live(went - jump, seconds, fell > 0 ? 0.3 : 0.75); unit > 0) return unit;
   return std::nullopt;
 }
 

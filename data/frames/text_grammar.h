@@ -116,8 +116,9 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& lines);
 /// a better array; the others are signals. A doubt is added to `grammar`.
 void find_roles(TextGrammar& grammar, double seconds);
 
-/// The unit (s) of a column of stamps, from how far it went in `seconds`: 1, 1e-3 or 1e-6; empty when it is
-/// no clock. For bytes that came at once, as from a file: milliseconds where all are whole, else seconds.
+/// The unit (s) of a column of stamps, from how far it went in `seconds`: 1, 1e-3, 1e-6 or 1e-9; empty when
+/// it is no clock. For bytes that came at once, as from a file: the unit in which the mean step is a
+/// sensor's; empty where two are as likely, where stamps fall, or count by one.
 std::optional<double> unit_of_clock(std::span<const double> stamps, double seconds);
 
 /// A format that may be it, and the array that its frames are.
