@@ -145,10 +145,8 @@ void declare(Arguments& arguments) {
               joined(press_kinds(), ", ") + ")")
       .option("fit", "RECORDING",
               "what was recorded of the sensor while somebody pressed here and there for half a minute: what "
-              "that "
-              "tells of noise, rests, skin, response, crosstalk, hysteresis and creep is written into "
-              "--sensor FILE "
-              "first")
+              "that tells of noise, rests, skin, response, crosstalk, hysteresis and creep is written into "
+              "--sensor FILE first")
       .option("scale", "N", "of --presses: truth N times as fine as the array: 2, 4, 8 or 16", "4")
       .option("seed", "N", "the same seed gives the same files", "1");
 }

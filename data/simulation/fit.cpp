@@ -235,9 +235,8 @@ BodyFit BodyFitter::operator()(const Recording& touches) const {
   const std::vector<double> found = touch_statistics(touches);
   if (found.empty())
     throw std::runtime_error(
-        "too little was pressed: expected 100 frames or more in which a taxel shows 8 % of the range; press "
-        "here and "
-        "there for half a minute, or let the probe find the range");
+        "too little was pressed: expected 100 frames or more in which a taxel shows 8 % of the range; "
+        "press here and there for half a minute, or let the probe find the range");
   if (const double unlike = regression_->unlike(found); unlike > kMostUnlike)
     throw std::runtime_error(
         "these touches are like none that were simulated (" + format(unlike, 3) +

@@ -236,9 +236,8 @@ TEST_F(Array, LivePicturesAreThoseOfEvaluation) {
       succeed("supertac-simulate --out data --plates bumps12 --speeds 20 --passes 1 --trials 1 --force " +
               sensor);
       succeed(
-          "supertac-train --data data --out m.safetensors --preset tiny --timesteps 32 --epochs 1 --stride "
-          "90 "
-          "--batch 8 --split none --force --rate " +
+          "supertac-train --data data --out m.safetensors --preset tiny --timesteps 32 --epochs 1 "
+          "--stride 90 --batch 8 --split none --force --rate " +
           rate);
       succeed(
           "supertac-evaluate --data data --model m.safetensors --split none --outputs outputs.safetensors "

@@ -144,9 +144,8 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
        "\"frame.fields\" must be a list of \"time\", {\"values\": N}, {\"skip\": BYTES} and "
        "{\"counter\": \"u8\"}, in turn, found {\"values\":12,\"skip\":1}"},
       {"order", Json{0, 1, 2},
-       "\"order\" must be row-major, column-major, or for each of the 12 taxels its place in the frame, from "
-       "0 "
-       "and each once, -1 where there is none, found 3 places, 3 different"},
+       "\"order\" must be row-major, column-major, or for each of the 12 taxels its place in the frame, "
+       "from 0 and each once, -1 where there is none, found 3 places, 3 different"},
       {"dead", Json{12}, "\"dead\" must be taxels 0 to 11, found 12"},
       {"rest", Json{40, 41}, "\"rest\" must be a number for each of the 12 signals, found 2"},
       {"rest", Json{"40"}, "\"rest\" must be a list of numbers, found [\"40\"]"},

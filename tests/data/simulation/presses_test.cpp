@@ -127,9 +127,7 @@ TEST(Presses, ThreeAxesLeanAndRestInTheMiddle) {
       simulate_presses(tip, {}, 1));
   EXPECT_REFUSAL(
       "presses: expected a kind of object (disc, bar, ring, edge, letter, fingertip, mixed, surface1, "
-      "surface2, "
-      "surface3, surface4, surface5, surface6, surface7), got "
-      "'cat'",
+      "surface2, surface3, surface4, surface5, surface6, surface7), got 'cat'",
       simulate_presses(mat(), {.kind = "cat"}, 1));
 }
 
