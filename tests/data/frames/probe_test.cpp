@@ -125,13 +125,14 @@ TEST(Probe, TakesNoNoiseOfFewLinesForAClock) {
 TEST(Probe, FindsAnArrayWithinAnObject) {
   std::vector<Heard> heard;
   for (int n = 0; n < 60; ++n) {
-    const std::string stamp = std::to_string(50 + 10 * n), value = std::to_string(30 + n % 3);
+    const std::string stamp = std::to_string(50 + 10'000'000 * n), value = std::to_string(30 + n % 3);
     heard.push_back(
-        {0.01 * n, R"({"finger":{"ms":)" + stamp + R"(,"taxels":[[1,)" + value + "],[3,4]]},\"n\":7}\n"});
+        {0.01 * n, R"({"finger":{"ns":)" + stamp + R"(,"taxels":[[1,)" + value + "],[3,4]]},\"n\":7}\n"});
   }
   const ProbeReport report = drafted(heard);
   EXPECT_EQ(report.draft->frame.values, "/finger/taxels");
-  EXPECT_EQ(report.draft->frame.time->key, "/finger/ms");
+  EXPECT_EQ(report.draft->frame.time->key, "/finger/ns");
+  EXPECT_EQ(report.draft->frame.time->unit_s, 1e-9);
   EXPECT_EQ(report.draft->array.rows, 2);
   for (Heard& chunk : heard)
     chunk.bytes = R"({"s0":1,"s1":2,"s2":3})"
