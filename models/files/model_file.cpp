@@ -191,18 +191,17 @@ std::vector<ModelFile> load_models(std::span<const std::string> paths) {
   std::vector<ModelFile> files;
   for (const std::string& path : paths) {
     files.push_back(load_model(path));
-    const auto said = [](const ModelFile& file) {
-      return model_metadata(file.model->settings(), file.input);
-    };
-    const auto ours = said(files.back()), theirs = said(files.front());
     const SuperTac &model = *files.back().model, &first = *files.front().model;
-    const bool same_format = model.format() == first.format() &&
-                             model.settings().predicted_error == first.settings().predicted_error;
-    for (const char* key : {"input", "settings"})
-      if (key == std::string("input") ? ours.at(key) != theirs.at(key) : !same_format)
-        throw std::runtime_error(path + ": its " + key + " are " + ours.at(key) + ", those of " + paths[0] +
-                                 " " + theirs.at(key) +
-                                 "; average models that take the same windows and draw the same pictures");
+    const auto ours = model_metadata(model.settings(), files.back().input),
+               theirs = model_metadata(first.settings(), files.front().input);
+    const bool same_input = ours.at("input") == theirs.at("input"),
+               same_pictures = model.format() == first.format() &&
+                               model.settings().predicted_error == first.settings().predicted_error;
+    if (same_input && same_pictures) continue;
+    const char* key = same_input ? "settings" : "input";
+    throw std::runtime_error(path + ": its " + key + " are " + ours.at(key) + ", those of " + paths[0] + " " +
+                             theirs.at(key) +
+                             "; average models that take the same windows and draw the same pictures");
   }
   return files;
 }
