@@ -145,7 +145,7 @@ std::vector<Candidate> load_candidates(const std::vector<std::string>& paths) {
   std::vector<Candidate> all;
   for (const std::string& path : paths) {
     ModelFile file = load_model(path);
-    const Recipe recipe = Recipe::of(file, path);
+    const Recipe recipe = Recipe::of(file);
     all.push_back({path, recipe, std::move(file)});
     const Candidate &first = all.front(), &last = all.back();
     if (recipe.split == SplitKind::none)

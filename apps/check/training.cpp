@@ -37,7 +37,7 @@ void check_recordings(const Arguments& a, const Recipe& recipe, const std::strin
 }
 
 TrainingTask task_of(const Arguments& a, const std::string& path) {
-  const Recipe recipe = Recipe::of(load_model(path), path);
+  const Recipe recipe = Recipe::of(load_model(path));
   check_recordings(a, recipe, path);
   return window_task(recipe, folders_of(a));
 }

@@ -123,7 +123,7 @@ Recipe recipe_of(const Arguments& a) {
     throw UsageError("expected --preset NAME or --recipe-of MODEL, found both");
   Recipe r;
   if (a.given("recipe-of")) {
-    r = Recipe::of(load_model(a.text("recipe-of")), a.text("recipe-of"));
+    r = Recipe::of(load_model(a.text("recipe-of")));
   } else {
     r = Recipe::named(a.choice("preset", {"paper", "tiny", "frame"}));
   }

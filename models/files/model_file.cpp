@@ -174,6 +174,7 @@ ModelFile model_of(const SafetensorsFile& file) {
   refuse_other_kinds(file);
   const SuperTacSettings settings = read_settings({file.metadata(), path, "settings"});
   ModelFile loaded;
+  loaded.path = path;
   loaded.metadata = file.metadata();
   loaded.input = read_input({file.metadata(), path, "input"});
   if (settings.timesteps == 1 && loaded.input.scaling.per_window)

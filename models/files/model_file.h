@@ -37,6 +37,7 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& settin
                                                   const InputSettings& input);
 
 struct ModelFile {
+  std::string path = {};  ///< that it was read from
   std::unique_ptr<SuperTac> model;
   InputSettings input;
   std::optional<Novelty> novelty;  ///< of its training windows; empty of too few windows, and of frames of

@@ -120,7 +120,8 @@ std::map<std::string, std::string> metadata_of(const Recipe& r) {
   return entries;
 }
 
-Recipe Recipe::of(const ModelFile& file, const std::string& path) {
+Recipe Recipe::of(const ModelFile& file) {
+  const std::string& path = file.path;
   const auto entry = [&](const char* key) {
     const auto found = file.metadata.find(key);
     if (found == file.metadata.end())

@@ -58,9 +58,9 @@ struct Recipe {
   /// they are, of sensors that press or lie still. Throws std::invalid_argument for another name, listing
   /// these.
   static Recipe named(const std::string& name);
-  /// What `file` (read from `path`) was trained with, its signal range included: the same recordings give the
-  /// same file again. Throws std::runtime_error naming path and entry when the file does not say it.
-  static Recipe of(const ModelFile& file, const std::string& path);
+  /// What `file` was trained with, its signal range included: the same recordings give the same file again.
+  /// Throws std::runtime_error naming path and entry when the file does not say it.
+  static Recipe of(const ModelFile& file);
 };
 
 /// What a model file says of its recipe besides the entries "settings" and "input" of model_metadata().

@@ -33,7 +33,7 @@ TEST(Recipe, ComesBackFromTheModelFile) {
     recipe.range = Scaling{.rest = 2, .span = 0.5};
     recipe.augment.dropped = 1;
     const std::string path = folder / (std::string(name) + ".safetensors");
-    const Recipe back = Recipe::of(file_of(recipe, path), path);
+    const Recipe back = Recipe::of(file_of(recipe, path));
     EXPECT_EQ(metadata_of(back), metadata_of(recipe)) << name;
     EXPECT_EQ(model_metadata(back.model, {}), model_metadata(recipe.model, {})) << name;
     EXPECT_EQ(back.rate_hz, recipe.rate_hz);
@@ -89,8 +89,7 @@ TEST(Recipe, AFileThatDoesNotSayItIsRefusedByName) {
   const TemporaryFolder folder;
   const std::string path = folder / "old.safetensors";
   save_model(path, random_network(), {}, {{"seed", "1"}});
-  EXPECT_ERROR(Recipe::of(load_model(path), path), std::runtime_error,
-               path + ": metadata \"training\" is missing");
+  EXPECT_ERROR(Recipe::of(load_model(path)), std::runtime_error, path + ": metadata \"training\" is missing");
 }
 
 }  // namespace supertac::recipe_test
