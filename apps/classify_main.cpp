@@ -15,6 +15,7 @@
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "autograd/ops/losses.h"
+#include "autograd/ops/shaping.h"
 #include "autograd/optimisers/adam.h"
 #include "data/scores/statistics.h"
 #include "data/windows/batching.h"
@@ -51,7 +52,7 @@ struct Candidate {
   std::string path;
   Recipe recipe;
   ModelFile file;
-  std::vector<std::uint32_t> train = {}, test = {};
+  Split split = {};
 };
 
 // Windows, and for each pass the class of its plate, by the order in which plates come.
@@ -84,32 +85,21 @@ Tensor gather(const WindowSet& windows, std::span<const std::uint32_t> indices) 
   return all;
 }
 
-// Windows [N,T,signals] -> [N,rows,columns,channels].
-Tensor last_frames(const Tensor& windows, const TaxelArray& array) {
-  const Dim count = windows.dim(0), signals = windows.dim(2), stride = windows.dim(1) * signals;
-  Tensor frames(Shape{count, array.rows, array.columns, array.channels});
-  for (Dim n = 0; n < count; ++n)
-    std::copy_n(windows.data() + (n + 1) * stride - signals, signals, frames.data() + n * signals);
-  return frames;
-}
-
 // Windows [N,T,signals] -> [N,height,width,channels]; latents are channels of one pixel.
 Tensor show(View view, const SuperTac& model, const TaxelArray& array, const Tensor& windows) {
-  if (view == View::frame) return last_frames(windows, array);
+  if (view == View::frame)
+    return last_frame(Variable(windows), array.rows, array.columns, array.channels).value();
   if (view == View::super_resolved) return model.infer(windows);
   const Tensor latents = model.encode(windows);
-  Tensor x(Shape{latents.dim(0), 1, 1, latents.dim(1)});
-  std::ranges::copy(latents.values(), x.data());
-  return x;
+  return Tensor::of({latents.dim(0), 1, 1, latents.dim(1)}, latents.values());
 }
 
 // Training windows are augmented as the model's were. Throws std::runtime_error when the loss is not finite.
 void train(const TextureClassifier& classifier, const Candidate& model, const Labelled& data, View view,
            std::int64_t epochs, std::uint64_t seed) {
   const WindowSet& windows = data.windows;
-  const Batching batching(model.train, kBatch, seed);
-  const auto per_epoch = static_cast<std::uint64_t>(batching.batches_per_epoch());
-  const auto total = static_cast<std::int64_t>(per_epoch) * epochs;
+  const Batching batching(model.split.train, kBatch, seed);
+  const auto total = static_cast<std::int64_t>(batching.batches_per_epoch()) * epochs;
   const Schedule schedule{.peak = kLearningRate,
                           .warm_up = static_cast<std::int64_t>(kWarmUp * static_cast<double>(total)),
                           .total = total};
@@ -117,13 +107,11 @@ void train(const TextureClassifier& classifier, const Candidate& model, const La
   std::vector<std::uint32_t> indices(batching.batch_size());
   for (std::int64_t step = 0; step < total; ++step) {
     stop_if_interrupted();
-    const std::uint64_t epoch = static_cast<std::uint64_t>(step) / per_epoch;
-    const std::uint64_t b = static_cast<std::uint64_t>(step) % per_epoch;
-    batching.batch(epoch, b, indices);
+    batching.batch(static_cast<std::uint64_t>(step), indices);
     Tensor shown = gather(windows, indices);
     const auto size = shown.values().size() / indices.size();
     for (std::size_t n = 0; model.recipe.augment.any() && n < indices.size(); ++n)
-      augment(model.recipe.augment, seed, batching.sample(epoch, b, n),
+      augment(model.recipe.augment, seed, batching.sample(static_cast<std::uint64_t>(step), n),
               shown.values().subspan(n * size, size), windows.array());
     std::vector<std::int32_t> labels;
     for (const std::uint32_t i : indices) labels.push_back(data.label_of_pass[windows.pass_of(i)]);
@@ -164,11 +152,11 @@ std::vector<Candidate> load_candidates(const std::vector<std::string>& paths) {
 // std::runtime_error when that split cannot be repeated on these windows.
 void take_split(Candidate& model, const WindowSet& windows, const std::string& folder) {
   std::vector<std::uint32_t> held_out;
-  Split split = split_of(windows, model.recipe, held_out);
+  Split& split = model.split = split_of(windows, model.recipe, held_out);
   // Trials are what they are; other splits are drawn from the windows there are. A training has more windows
   // than these, in which nothing is felt.
   if (model.recipe.split != SplitKind::trial) {
-    const TrainingTask task = window_task(model.recipe, {.data = folder});
+    const TrainingTask task = window_task(model.recipe, folder);
     if (task.split.test != split.test ||
         task.origin.at("split_fingerprint") != value_or(model.file.metadata, "split_fingerprint"))
       throw std::runtime_error(model.path +
@@ -177,7 +165,6 @@ void take_split(Candidate& model, const WindowSet& windows, const std::string& f
   }
   std::erase_if(split.train, [&](std::uint32_t i) { return !windows.contact(i); });
   if (split.train.empty()) throw std::runtime_error("no training window is in contact with its plate");
-  model.train = std::move(split.train), model.test = std::move(split.test);
 }
 
 // Trains a classifier and returns its answer to every test window, in order. The same arguments give the same
@@ -187,14 +174,14 @@ std::vector<std::int32_t> answers(const Candidate& model, const Labelled& data, 
   const auto shown = [&](std::span<const std::uint32_t> indices) {
     return show(view, *model.file.model, data.windows.array(), gather(data.windows, indices));
   };
-  const Tensor sample = shown(std::span(model.train).first(1));
+  const Tensor sample = shown(std::span(model.split.train).first(1));
   Rng rng(seed);
   const TextureClassifier classifier(
       {.height = sample.dim(1), .width = sample.dim(2), .channels = sample.dim(3), .classes = data.classes},
       rng);
   train(classifier, model, data, view, epochs, seed);
   const NoGrad no_grad;
-  const std::span<const std::uint32_t> test(model.test);
+  const std::span<const std::uint32_t> test(model.split.test);
   std::vector<std::int32_t> result;
   for (std::size_t first = 0; first < test.size(); first += kBatch) {
     stop_if_interrupted();
@@ -281,7 +268,7 @@ std::vector<Parts> experiment(const Arguments& a, const std::vector<View>& views
   });
   std::vector<Parts> results(views.size(), Parts(std::size(kParts)));
   for (std::size_t job = 0; job < given.size(); ++job) {
-    const std::vector<std::uint32_t>& test = model_of(job).test;
+    const std::vector<std::uint32_t>& test = model_of(job).split.test;
     const std::vector<std::size_t> parts = parts_of(data.windows, test);
     Parts& tallies = results[job % views.size()];
     for (std::size_t n = 0; n < test.size(); ++n) {
@@ -334,8 +321,8 @@ int run(Arguments& a) {
       WindowSet::load(a.text("data"), a.given("plates") ? a.list("plates") : first.recipe.plates, taken));
   for (Candidate& model : models) take_split(model, data.windows, a.text("data"));
   const std::string split = name_of(first.recipe.split);
-  a.note("split " + split + ": " + std::to_string(first.train.size()) + " training windows, " +
-         std::to_string(first.test.size()) + " test windows");
+  a.note("split " + split + ": " + std::to_string(first.split.train.size()) + " training windows, " +
+         std::to_string(first.split.test.size()) + " test windows");
   const std::vector<Parts> results = experiment(a, views, models, data);
   a.print(std::string("frame: the last frame of the window as the network sees it, ") +
           (taken.scaling.per_window ? "normalised to the window's own rest and gain"

@@ -7,6 +7,7 @@
 #include "apps/common/running/signals.h"
 #include "apps/evaluate/exports.h"
 #include "apps/evaluate/scoring.h"
+#include "apps/train/training_options.h"
 #include "data/recordings/recording.h"
 #include "data/scores/baselines.h"
 #include "data/windows/windows.h"
@@ -44,14 +45,13 @@ WindowSet load_windows(const Arguments& a, const ModelFile& file) {
       a.given("plates") ? a.list("plates") : comma_list(value_or(file.metadata, "plates"));
   add_model_parents(a.list("model"));
   add_parent("recordings", hash_of_recordings(a.text("data"), plates));
-  return WindowSet::load(a.text("data"), plates, file.windows(),
-                         progress_of(a, "reading " + a.text("data"), "recordings"));
+  return WindowSet::load(a.text("data"), plates, file.windows(), reading_progress(a));
 }
 
 /// The scores of the network and of every baseline over the same windows.
-struct RecordingScores {
-  RecordingScores(const WindowSet& windows, const ModelFile& model, const std::vector<Plate>& kinds,
-                  std::size_t methods)
+struct TestScores {
+  TestScores(const WindowSet& windows, const ModelFile& model, const std::vector<Plate>& kinds,
+             std::size_t methods)
       : trust(windows, model), map(windows, model, kinds) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
@@ -62,7 +62,7 @@ struct RecordingScores {
   MapScores map;
 };
 
-void score(const Drawn& d, const WindowSet& windows, RecordingScores& scores) {
+void score(const Drawn& d, const WindowSet& windows, TestScores& scores) {
   const Zone zone = windows.zone(d.example);
   const auto level = windows.contact_level();
   for (std::size_t m = 0; m < d.pictures.size(); ++m)
@@ -76,11 +76,11 @@ void score(const Drawn& d, const WindowSet& windows, RecordingScores& scores) {
 }
 
 /// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.
-RecordingScores score_all(const Arguments& a, const Ensemble& network, const ModelFile& file,
-                          const WindowSet& windows, const TestSet& tested, const Baselines& baselines,
-                          const std::vector<Plate>& kinds, OutputsFile* outputs) {
+TestScores score_all(const Arguments& a, const Ensemble& network, const ModelFile& file,
+                     const WindowSet& windows, const TestSet& tested, const Baselines& baselines,
+                     const std::vector<Plate>& kinds, OutputsFile* outputs) {
   const std::vector<std::uint32_t>& test = tested.split.test;
-  RecordingScores scores(windows, file, kinds, 1 + baselines.size());
+  TestScores scores(windows, file, kinds, 1 + baselines.size());
   std::vector<std::vector<float>> plain(baselines.size(), std::vector<float>(windows.image().pixels()));
   Progress progress(a, "evaluating", test.size(), "pictures");
   for_each_output(network, windows, test, [&](const EvaluatedBatch& b) {
@@ -102,7 +102,7 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
 }
 
 Json result_of(const Arguments& a, const Ensemble& network, const WindowSet& windows, const TestSet& tested,
-               const Baselines& baselines, const RecordingScores& scores) {
+               const Baselines& baselines, const TestScores& scores) {
   Json result = scores.of_method.front().to_json();
   result["by_distance"] = scores_by_distance(windows, scores.contact);
   result["groups"] = scores_by_group(scores.by_group);
@@ -194,8 +194,8 @@ int run(Arguments& a) {
   OutputsFile outputs(windows);
   const Baselines baselines =
       fit_baselines(windows, tested.split.train, progress_of(a, "fitting the baselines", "parts"));
-  const RecordingScores scores = score_all(a, network, files.front(), windows, tested, baselines, kinds,
-                                           a.given("outputs") ? &outputs : nullptr);
+  const TestScores scores = score_all(a, network, files.front(), windows, tested, baselines, kinds,
+                                      a.given("outputs") ? &outputs : nullptr);
   const Json result = result_of(a, network, windows, tested, baselines, scores);
   print_result(a, result, has_groups(windows));
   if (pictures) write_pictures(network, files.front().interval(), windows, tested.split.test, *pictures);

@@ -21,6 +21,7 @@
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 #include "models/training/audit/ledger.h"
+#include "models/training/train.h"
 
 namespace supertac {
 
@@ -287,7 +288,7 @@ int run(Arguments& a) {
   return together(a, [&](Ranks& ranks) {
     as_usage([&] { check_micro_batches(ranks.size(), 8); });
     const Recipe recipe = recipe_of(a);
-    TrainingTask task = window_task(recipe, folders_of(a));
+    TrainingTask task = window_task(recipe, a.text("data"), reading_progress(a));
     add_parent("recordings", hash_of_recordings(a.text("data"), recipe.plates));
     return TrainingRun(a, std::move(task), ranks).train();
   });

@@ -42,9 +42,9 @@ void refuse(const std::string& op, const std::string& argument, const std::strin
   throw std::invalid_argument(op + ": " + argument + " expects " + expected + ", got " + got);
 }
 
-std::string digits(double number) {
+std::string digits(double number, int count) {
   char text[32];
-  return {text, static_cast<std::size_t>(std::snprintf(text, sizeof text, "%.9g", number))};
+  return {text, static_cast<std::size_t>(std::snprintf(text, sizeof text, "%.*g", count, number))};
 }
 
 void check_defined(const char* op, const char* argument, const Variable& x) {

@@ -65,8 +65,8 @@ Variable record(const char* op, Tensor y, std::initializer_list<const Variable*>
 /// well.
 [[noreturn]] void refuse(const std::string& op, const std::string& argument, const std::string& expected,
                          const std::string& got);
-/// Nine digits of a number, for refuse(): two floats that differ read differently.
-std::string digits(double number);
+/// So many digits of a number; with nine, as refuse() is given it, two floats that differ read differently.
+std::string digits(double number, int count = 9);
 void check_defined(const char* op, const char* argument, const Variable& x);
 void check_rank(const char* op, const char* argument, const Variable& x, int rank);
 void check_shape(const char* op, const char* argument, const Variable& x, const Shape& expected);

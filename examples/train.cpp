@@ -19,7 +19,7 @@ int main(int argc, char** argv) try {
   Recipe recipe = Recipe::named("tiny");
   recipe.epochs = std::atoi(argv[3]);
   recipe.stride = std::atoi(argv[4]);
-  train(recipe, {.data = argv[1]}, argv[2], {.log = [](const LogLine& line) {
+  train(recipe, argv[1], argv[2], {.log = [](const LogLine& line) {
           std::printf("step %ld  loss %.4f\n", static_cast<long>(line.step), line.total);
         }});
   std::printf("content %s\n", content_hash(SafetensorsFile::read(argv[2])).c_str());

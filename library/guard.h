@@ -10,6 +10,8 @@
 #include <string>
 #include <type_traits>
 
+#include "autograd/record.h"
+
 namespace supertac::c {
 
 /// Keeps what supertac_error() says.
@@ -36,10 +38,12 @@ auto guarded(const char* function, std::initializer_list<const void*> pointers, 
     return -1;
 }
 
-/// Fills as much of `to` as its size says: later versions have more.
+/// Fills as much of `to` as its size says: later versions have more. Throws std::invalid_argument where that
+/// is too small to be one.
 template <class Description>
 int describe(Description* to, Description full) {
-  if (to->size < sizeof(std::size_t)) throw std::invalid_argument("description.size: set it to sizeof first");
+  if (to->size < sizeof(std::size_t))
+    refuse("describe", "description.size", "sizeof(*description)", std::to_string(to->size));
   full.size = std::min(to->size, sizeof full);
   std::memcpy(to, &full, full.size);
   return 0;

@@ -59,8 +59,8 @@ thread_local bool alone = false;
 });
 
 supertac_model* opened(ModelFile file, int precision) {
-  expect(precision == SUPERTAC_FP32 || precision == SUPERTAC_INT8,
-         "precision: expected SUPERTAC_FP32 or SUPERTAC_INT8");
+  if (precision != SUPERTAC_FP32 && precision != SUPERTAC_INT8)
+    refuse("supertac_open", "precision", "SUPERTAC_FP32 or SUPERTAC_INT8", std::to_string(precision));
   Ensemble network = ensemble_of({&file, 1}, precision == SUPERTAC_INT8 ? Precision::int8 : Precision::fp32);
   return new supertac_model{std::move(file), std::move(network)};
 }
@@ -78,7 +78,8 @@ void scale(const ModelFile& file, std::span<float> windows) {
 
 void draw(const supertac_model& model, const Tensor& inputs, float* pictures, float* predicted_errors) {
   const Estimate drawn = model.network.estimate(inputs);
-  expect(predicted_errors == nullptr || drawn.predicted_error.size() > 0, "the model predicts no error");
+  expect(predicted_errors == nullptr || drawn.predicted_error.size() > 0,
+         "predicted errors expect a model that predicts them, got one that does not");
   std::copy_n(drawn.picture.data(), drawn.picture.size(), pictures);
   if (predicted_errors != nullptr)
     std::copy_n(drawn.predicted_error.data(), drawn.predicted_error.size(), predicted_errors);
@@ -97,7 +98,7 @@ void c::keep(const char* text) noexcept {
 
 void c::expect_within(const char* what, double found, double least, double most) {
   if (found >= least && found <= most) return;
-  throw std::invalid_argument(std::string(what) + " must be " + format(least) + " to " + format(most) +
+  throw std::invalid_argument(std::string(what) + " expects " + format(least) + " to " + format(most) +
                               ", got " + format(found));
 }
 
@@ -151,8 +152,8 @@ int supertac_draw(const supertac_model* model, std::size_t count, const float* w
     const SuperTac& network = *model->file.model;
     const auto window = static_cast<std::size_t>(network.input_shape(1).elements());
     const auto picture = static_cast<std::size_t>(network.picture_shape(1).elements());
-    expect(count <= std::numeric_limits<std::size_t>::max() / sizeof(float) / std::max(window, picture),
-           "supertac_draw: more windows than memory can hold");
+    if (count > std::numeric_limits<std::size_t>::max() / sizeof(float) / std::max(window, picture))
+      refuse("supertac_draw", "count", "no more windows than memory can hold", std::to_string(count));
     const auto batches = static_cast<std::int64_t>((count + kBatch - 1) / kBatch);
     if (alone) threads = 1;
     std::exception_ptr failure;
@@ -272,8 +273,10 @@ int supertac_pairs_read(const supertac_pairs* pairs, std::size_t first, std::siz
                         float* truths) {
   return guarded(__func__, {pairs, windows, truths}, [&] {
     const WindowSet& all = pairs->windows;
-    expect(first <= all.size() && count <= all.size() - first,
-           "supertac_pairs_read: there are not so many pairs");
+    expect_within("supertac_pairs_read: first", static_cast<double>(first), 0,
+                  static_cast<double>(all.size()));
+    expect_within("supertac_pairs_read: count", static_cast<double>(count), 0,
+                  static_cast<double>(all.size() - first));
     const std::size_t pixels = all.image().pixels();
     for (std::size_t i = 0; i < count; ++i) {
       all.window(first + i, std::span(windows + i * all.input_size(), all.input_size()));
@@ -288,7 +291,9 @@ int supertac_train(const char* recipe, const char* recordings, const char* out,
   return guarded(__func__, {recipe, recordings, out}, [&] {
     Recipe wanted = Recipe::named(recipe);
     if (settings != nullptr) {
-      expect(settings->size == sizeof(supertac_training), "supertac_train: set settings.size first");
+      if (settings->size != sizeof(supertac_training))
+        refuse("supertac_train", "settings.size", "sizeof(supertac_training)",
+               std::to_string(settings->size));
       if (settings->epochs != 0) wanted.epochs = settings->epochs;
       if (settings->stride != 0) wanted.stride = settings->stride;
       if (settings->split != nullptr) wanted.split = split_kind(settings->split);
@@ -299,6 +304,6 @@ int supertac_train(const char* recipe, const char* recordings, const char* out,
     callbacks.stop = [&] { return stop; };
     if (progress != nullptr)
       callbacks.step = [&](const StepReport& step) { stop = progress(user, step.step, step.total) != 0; };
-    return train(wanted, {.data = recordings}, out, callbacks) ? 1 : 0;
+    return train(wanted, recordings, out, callbacks) ? 1 : 0;
   });
 }

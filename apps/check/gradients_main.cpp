@@ -1,13 +1,13 @@
 // supertac-check-gradients: what `supertac-check gradients` runs, compiled with real = double.
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <string>
 
 #include "apps/check/gradient_cases.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
+#include "autograd/record.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
@@ -16,12 +16,6 @@ namespace supertac {
 using Json = nlohmann::ordered_json;
 
 void declare(Arguments&) {}
-
-static std::string digits(double value, int count) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.*g", count, value);
-  return text;
-}
 
 static void print_row(const Arguments& a, const std::string& kind, const std::string& name,
                       const std::string& entries, const std::string& error, const std::string& rest) {

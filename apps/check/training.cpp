@@ -18,6 +18,7 @@
 #include "models/files/model_file.h"
 #include "models/training/audit/ledger.h"
 #include "models/training/audit/opened_step.h"
+#include "models/training/train.h"
 
 namespace supertac {
 namespace {
@@ -39,7 +40,7 @@ void check_recordings(const Arguments& a, const Recipe& recipe, const std::strin
 TrainingTask task_of(const Arguments& a, const std::string& path) {
   const Recipe recipe = Recipe::of(load_model(path));
   check_recordings(a, recipe, path);
-  return window_task(recipe, folders_of(a));
+  return window_task(recipe, a.text("data"), reading_progress(a));
 }
 
 /// A training with a ledger, made again from the states that it kept.
@@ -50,16 +51,15 @@ class Repetition {
   Repetition(const Arguments& a, const std::string& model)
       : folder_(run_folder_of(model)),
         ledger_(Ledger::read(LedgerFile::path_in(folder_))),
-        task_(task_of(a, model)) {
-    trainer_.emplace(*task_.windows, task_.split.train, task_.recipe);
-  }
+        task_(task_of(a, model)),
+        trainer_(*task_.windows, task_.split.train, task_.recipe) {}
 
   struct Segment {
     std::int64_t from, to;
   };
   /// From kept state to kept state. Throws FileError when one is missing.
   std::vector<Segment> segments() const {
-    const std::int64_t total = trainer_->total_steps(), apart = LedgerFile::apart(ledger_.every, total);
+    const std::int64_t total = trainer_.total_steps(), apart = LedgerFile::apart(ledger_.every, total);
     std::vector<Segment> segments;
     for (std::int64_t from = 0; from < total; from += apart) {
       if (!std::filesystem::exists(LedgerFile::state_path(folder_, from)))
@@ -72,26 +72,26 @@ class Repetition {
 
   /// Goes to the last kept state at or before `step`; what it returns is how the state differs from its line.
   std::optional<LedgerDifference> start(std::int64_t step) {
-    const std::int64_t total = trainer_->total_steps(), apart = LedgerFile::apart(ledger_.every, total);
+    const std::int64_t total = trainer_.total_steps(), apart = LedgerFile::apart(ledger_.every, total);
     const std::int64_t kept = step == total ? total : step / apart * apart;
-    trainer_->restore(LedgerFile::state_path(folder_, kept), task_.origin);
+    trainer_.restore(LedgerFile::state_path(folder_, kept), task_.origin);
     const std::optional<LedgerLine> line = ledger_.at(kept);
-    writer_.emplace(*trainer_, ledger_.every, line ? &*line : nullptr);
+    writer_.emplace(trainer_, ledger_.every, line ? &*line : nullptr);
     line_.reset();
     if (!line) return std::nullopt;  // the beginning, which follows from the seed
     LedgerLine mine = *line;
-    mine.tensors = hashes_of(*trainer_);
+    mine.tensors = hashes_of(trainer_);
     return difference(ledger_, *line, mine);
   }
 
   /// Makes a step, by `make` where it is given, and compares with the ledger where that has a line.
   std::optional<LedgerDifference> make_step(const std::function<void()>& make = {}) {
     stop_if_interrupted();
-    const std::int64_t before = trainer_->step();
+    const std::int64_t before = trainer_.step();
     if (make) {
       make();
     } else {
-      trainer_->train_step();
+      trainer_.train_step();
     }
     line_ = writer_->after_step();
     if (!line_) return std::nullopt;
@@ -102,23 +102,23 @@ class Repetition {
   /// start() and steps up to segment.to, with a progress bar, or to the first difference.
   std::optional<LedgerDifference> repeat(const Segment& segment, const Arguments& a) {
     auto d = start(segment.from);
-    const std::int64_t from = trainer_->step();
+    const std::int64_t from = trainer_.step();
     Progress progress(a, "repeating", static_cast<std::uint64_t>(segment.to - from), "steps");
-    for (; !d && trainer_->step() < segment.to;
-         progress.update(static_cast<std::uint64_t>(trainer_->step() - from)))
+    for (; !d && trainer_.step() < segment.to;
+         progress.update(static_cast<std::uint64_t>(trainer_.step() - from)))
       d = make_step();
     return d;
   }
   /// The line that the last step gave, if any.
   const std::optional<LedgerLine>& line() const { return line_; }
 
-  Trainer& trainer() { return *trainer_; }
+  Trainer& trainer() { return trainer_; }
 
  private:
   std::string folder_;
   Ledger ledger_;
   TrainingTask task_;
-  std::optional<Trainer> trainer_;
+  Trainer trainer_;
   std::optional<LedgerWriter> writer_;
   std::optional<LedgerLine> line_;
 };
@@ -139,7 +139,7 @@ using Segment = Repetition::Segment;
 
 // Those to be repeated, drawn without looking at them, in their order.
 std::vector<Segment> drawn(std::vector<Segment> segments, std::size_t count, std::uint64_t seed) {
-  const RandomStream random(seed, stream_of("audit"));
+  const RandomStream random(seed, stream_hashed("audit"));
   for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
     const auto rest = static_cast<double>(segments.size() - i);
     std::swap(segments[i], segments[i + static_cast<std::size_t>(random.uniform(i) * rest)]);
@@ -198,9 +198,8 @@ namespace {
 void write_arrays(const OutputPath& out, const std::map<std::string, Tensor>& arrays, const Json& operators) {
   std::vector<TensorToWrite> tensors;
   for (const auto& [hash, values] : arrays) {
-    std::vector<std::uint64_t> shape;
-    for (const Dim d : values.shape().dims()) shape.push_back(static_cast<std::uint64_t>(d));
-    tensors.push_back({hash, "F32", shape, std::as_bytes(values.values())});
+    const std::span<const Dim> shape = values.shape().dims();
+    tensors.push_back({hash, "F32", {shape.begin(), shape.end()}, std::as_bytes(values.values())});
   }
   write_safetensors(out, {{"kind", "operators"}, {"operators", operators.dump()}}, tensors);
 }

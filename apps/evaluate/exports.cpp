@@ -1,6 +1,7 @@
 #include "apps/evaluate/exports.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <utility>
@@ -20,13 +21,10 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kStrips = 12, kFilmColumns = 24;
 
+// What people are shown of a window: the last frame's taxels, the picture, the truth, and half the width of
+// each pixel's 90 % interval, of which there is none where the network has none.
 constexpr const char* kParts[] = {"felt", "drawn", "true", "off by"};
-
-// A window as it is shown to people.
-struct ShownWindow {
-  std::vector<float> input, drawn, truth;  // the last frame's taxels, and pictures
-  std::vector<float> half_widths;          // of the pixels' 90 % intervals; empty where the network has none
-};
+using ShownWindow = std::array<std::vector<float>, std::size(kParts)>;
 
 // The windows `chosen`, drawn once more.
 std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& windows,
@@ -35,13 +33,13 @@ std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& wi
   for_each_output(network, windows, chosen, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < b.size(); ++n) {
       const auto drawn = b.output(n), truth = b.target(n);
-      ShownWindow one{.input = mean_of_channels(windows.array(), windows.shown_frame(chosen[b.first + n])),
-                      .drawn = {drawn.begin(), drawn.end()},
-                      .truth = {truth.begin(), truth.end()},
-                      .half_widths = {}};
-      interval.with_load(network.first().format(), b.input(n), b.predicted_error(n), one.half_widths);
-      interval.half_widths(drawn, windows.image().width, one.half_widths, one.half_widths);
-      shown.push_back(std::move(one));
+      std::vector<float> half_widths;
+      interval.with_load(network.first().format(), b.input(n), b.predicted_error(n), half_widths);
+      interval.half_widths(drawn, windows.image().width, half_widths, half_widths);
+      shown.push_back({mean_of_channels(windows.array(), windows.shown_frame(chosen[b.first + n])),
+                       {drawn.begin(), drawn.end()},
+                       {truth.begin(), truth.end()},
+                       half_widths});
     }
     return true;
   });
@@ -50,23 +48,18 @@ std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& wi
 
 // Each window's parts, with headings, units and a colour bar. `down`: windows stand below each other, else
 // side by side.
-Picture figure(const std::vector<ShownWindow>& shown, std::span<const std::uint32_t> chosen,
-               const WindowSet& windows, int side, bool down, const std::string& title) {
+Picture drawing_of(const std::vector<ShownWindow>& shown, std::span<const std::uint32_t> chosen,
+                   const WindowSet& windows, int side, bool down, const std::string& title) {
   const TaxelArray& array = windows.array();
   const ImageGrid image = windows.image();
-  const int parts = shown.empty() || shown.front().half_widths.empty() ? 3 : 4,
-            count = static_cast<int>(shown.size());
+  const int parts = shown.empty() || shown.front()[3].empty() ? 3 : 4, count = static_cast<int>(shown.size());
   std::vector<PanelValues> panels;
   for (int i = 0; i < count * parts; ++i) {
-    const ShownWindow& w = shown[static_cast<std::size_t>(down ? i / parts : i % count)];
-    const int part = down ? i % parts : i / count;
-    if (part == 0)
-      panels.push_back({w.input, array.rows, array.columns});
-    else
-      panels.push_back({part == 1   ? w.drawn
-                        : part == 2 ? w.truth
-                                    : w.half_widths,
-                        image.height, image.width});
+    const auto window = static_cast<std::size_t>(down ? i / parts : i % count),
+               part = static_cast<std::size_t>(down ? i % parts : i / count);
+    const bool is_frame = part == 0;
+    panels.push_back(
+        {shown[window][part], is_frame ? array.rows : image.height, is_frame ? array.columns : image.width});
   }
   const Picture inside = panel_grid(panels, down ? parts : count, side);
   Captions captions{.title = title + "; a picture is " + format(image.width_mm()) + " x " +
@@ -120,26 +113,27 @@ std::vector<ContactScore> extremes(const WindowSet& windows, std::span<const Con
   return chosen;
 }
 
-std::string name_of(const WindowSet& windows, std::uint32_t window) {
-  const WindowSet::Pass& pass = windows.passes()[windows.pass_of(window)];
+// With its group where that is another.
+std::string name_of(const WindowSet::Pass& pass) {
   return (group_of(pass) == pass.plate ? "" : pass.group + ", ") + pass.plate + ", trial " +
          std::to_string(pass.trial) + ", pass " + std::to_string(pass.pass) +
-         (pass.speed_mm_s > 0 ? ", " + format(pass.speed_mm_s) + " mm/s" : "") + ", " +
-         windows.place_text(window);
+         (pass.speed_mm_s > 0 ? ", " + format(pass.speed_mm_s) + " mm/s" : "");
 }
 
-Json shown(const std::vector<ContactScore>& chosen, const WindowSet& windows, const Ensemble& network) {
+Json windows_as_json(const std::vector<ContactScore>& chosen, const WindowSet& windows,
+                     const Ensemble& network) {
   std::vector<std::uint32_t> which;
   for (const ContactScore& one : chosen) which.push_back(one.window);
   const std::vector<ShownWindow> pictures = draw_again(network, windows, which, {});
   auto json = Json::array();
   for (std::size_t i = 0; i < chosen.size(); ++i)
-    json.push_back({{"name", name_of(windows, which[i])},
-                    {"ssim", chosen[i].ssim},
-                    {"psnr_db", chosen[i].psnr_db},
-                    {"felt", levels_base64(pictures[i].input)},
-                    {"drawn", levels_base64(pictures[i].drawn)},
-                    {"true", levels_base64(pictures[i].truth)}});
+    json.push_back(
+        {{"name", name_of(windows.passes()[windows.pass_of(which[i])]) + ", " + windows.place_text(which[i])},
+         {"ssim", chosen[i].ssim},
+         {"psnr_db", chosen[i].psnr_db},
+         {"felt", levels_base64(pictures[i][0])},
+         {"drawn", levels_base64(pictures[i][1])},
+         {"true", levels_base64(pictures[i][2])}});
   return json;
 }
 
@@ -182,7 +176,7 @@ void write_pictures(const Ensemble& model, const PixelInterval& interval, const 
   }
   const auto drawn = [&](const std::vector<std::uint32_t>& chosen, int side, bool down,
                          const std::string& title) {
-    return figure(draw_again(model, windows, chosen, interval), chosen, windows, side, down, title);
+    return drawing_of(draw_again(model, windows, chosen, interval), chosen, windows, side, down, title);
   };
   write_png(folder.add("strips.png"), drawn(evenly_spaced(touching.empty() ? test : touching, kStrips), 96,
                                             true, "Windows in contact"));
@@ -191,9 +185,7 @@ void write_pictures(const Ensemble& model, const PixelInterval& interval, const 
     const std::string name = p.plate + "_t" + std::to_string(p.trial) + "_p" + std::to_string(p.pass) + "_v" +
                              std::to_string(static_cast<int>(p.speed_mm_s));
     write_png(folder.add("film_" + name + ".png"),
-              drawn(evenly_spaced(list, kFilmColumns), 48, false,
-                    p.plate + ", trial " + std::to_string(p.trial) + ", pass " + std::to_string(p.pass) +
-                        ", " + format(p.speed_mm_s) + " mm/s"));
+              drawn(evenly_spaced(list, kFilmColumns), 48, false, name_of(p)));
   }
 }
 
@@ -214,9 +206,9 @@ std::string evaluation_page(const Ensemble& network, const WindowSet& windows,
                       {"columns", windows.array().columns},
                       {"scale", windows.settings().scale},
                       {"colours", colour_map_base64()},
-                      {"worst_of_groups", shown(of_groups, windows, network)},
-                      {"worst", shown(extremes(windows, scores, false), windows, network)},
-                      {"best", shown(extremes(windows, scores, true), windows, network)}});
+                      {"worst_of_groups", windows_as_json(of_groups, windows, network)},
+                      {"worst", windows_as_json(extremes(windows, scores, false), windows, network)},
+                      {"best", windows_as_json(extremes(windows, scores, true), windows, network)}});
 }
 
 namespace {

@@ -18,10 +18,11 @@
 namespace supertac {
 namespace {
 
-// What decides which windows a split tests.
+// What decides which windows a split tests: the plates (of split group the groups) that were left out, or the
+// seed.
 std::string drawn_by(const ModelFile& file) {
-  const std::string plate = value_or(file.metadata, "leave_out");
-  return plate.empty() ? "seed " + value_or(file.metadata, "seed", "0") : "left-out plate " + plate;
+  const std::string names = value_or(file.metadata, "leave_out");
+  return names.empty() ? "seed " + value_or(file.metadata, "seed", "0") : "leaving out " + names;
 }
 
 bool is_drawn(const std::string& split) { return split != "trial" && split != "none"; }

@@ -29,8 +29,7 @@ static void declare_steps(Arguments& a) {
   a.decides_nothing();
   a.option("ledger", "N",
            "every N steps a line that names parameters, Adam's state and batches by hashes, and twenty "
-           "states on the "
-           "way, for supertac-check training");
+           "states on the way, for supertac-check training");
   a.decides_nothing();
   a.more(false);
 }
@@ -166,10 +165,8 @@ std::string run_folder_of(const std::string& model_file) {
   return std::filesystem::path(model_file).replace_extension(".run").string();
 }
 
-RecordingFolders folders_of(const Arguments& a) {
-  return {.data = a.text("data"), .watch = [&a](const std::string& folder) {
-            return progress_of(a, "reading " + folder, "recordings");
-          }};
+ReadingWatch reading_progress(const Arguments& a) {
+  return progress_of(a, "reading " + a.text("data"), "recordings");
 }
 
 }  // namespace supertac

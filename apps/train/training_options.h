@@ -1,8 +1,9 @@
-// The options of supertac-train: what they change in a recipe (models/training/recipe.h), and its folders.
+// The options of supertac-train: what they change in a recipe (models/training/recipe.h), and its folder.
 #pragma once
 
 #include "apps/common/command_line/arguments.h"
-#include "models/training/train.h"
+#include "data/recordings/resample.h"
+#include "models/training/recipe.h"
 
 namespace supertac {
 
@@ -15,7 +16,7 @@ Recipe recipe_of(const Arguments& a);
 /// Of a model file: "model.safetensors" -> "model.run".
 std::string run_folder_of(const std::string& model_file);
 
-/// --data, read with a progress bar.
-RecordingFolders folders_of(const Arguments& a);
+/// Shows how far the reading of --data is.
+ReadingWatch reading_progress(const Arguments& a);
 
 }  // namespace supertac

@@ -42,7 +42,7 @@ std::string random_token() {
   return base64(bytes);
 }
 
-[[noreturn]] void refuse(const WebAddress& address, const std::string& problem) {
+[[noreturn]] void cannot_serve(const WebAddress& address, const std::string& problem) {
   throw std::runtime_error("web: " + in_quotes(address.bind) + " port " + std::to_string(address.port) +
                            ": " + problem);
 }
@@ -52,7 +52,7 @@ sockaddr_in place_of(const WebAddress& address) {
   place.sin_family = AF_INET;
   place.sin_port = htons(address.port);
   if (inet_pton(AF_INET, address.bind.c_str(), &place.sin_addr) != 1)
-    refuse(address, "expected a numeric address of this computer, such as 127.0.0.1 or 0.0.0.0");
+    cannot_serve(address, "expected a numeric address of this computer, such as 127.0.0.1 or 0.0.0.0");
   return place;
 }
 
@@ -239,7 +239,7 @@ WebServer::WebServer(const WebAddress& address, WebSite site)
                              kRequestBytes, MHD_OPTION_NOTIFY_CONNECTION, &Peer::come_or_go, this,
                              MHD_OPTION_NOTIFY_COMPLETED, &Peer::has_answer, nullptr, MHD_OPTION_END);
   if (daemon_ == nullptr)
-    refuse(address_, std::string(strerror(errno)) + "; choose another port with --web PORT");
+    cannot_serve(address_, std::string(strerror(errno)) + "; choose another port with --web PORT");
   address_.port = MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_BIND_PORT)->port;
   const int listening = MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_LISTEN_FD)->listen_fd;
   setsockopt(listening, SOL_SOCKET, SO_SNDBUF, &kSendBuffer, sizeof kSendBuffer);  // connections inherit it
@@ -280,19 +280,16 @@ void WebServer::publish() {
 // Many that come and say nothing, or take nothing, must not keep out the one who works here. Whoever has just
 // come has not had the time to ask.
 void WebServer::make_room() {
-  const auto stays = [](const Peer& p) { return !p.leaves; };
   const double now = seconds_now();
-  const auto silent = [now](const Peer& p) { return !p.leaves && !p.asks && now - p.came_s > kToAskS; };
-  const auto not_asking = [this](const Peer& p) { return !p.leaves && !p.asks && &p != &peers_.back(); };
-  const auto behind = [this](const Peer& p) {
-    return !p.leaves && p.reads && number_ > p.seen + static_cast<std::uint64_t>(kMostEventsPerS);
+  const auto rank = [&](const Peer& p) {  // of the lowest the oldest leaves
+    if (p.leaves) return 4;
+    if (!p.asks && now - p.came_s > kToAskS) return 0;
+    if (p.reads && number_ > p.seen + static_cast<std::uint64_t>(kMostEventsPerS)) return 1;
+    return !p.asks && &p != &peers_.back() ? 2 : 3;
   };
-  for (auto open = std::ranges::count_if(peers_, stays); open > static_cast<std::ptrdiff_t>(kMostPeers);
-       --open) {
-    auto peer = std::ranges::find_if(peers_, silent);
-    if (peer == peers_.end()) peer = std::ranges::find_if(peers_, behind);
-    if (peer == peers_.end()) peer = std::ranges::find_if(peers_, not_asking);
-    if (peer == peers_.end()) peer = std::ranges::find_if(peers_, stays);
+  for (auto open = std::ranges::count(peers_, false, &Peer::leaves);
+       open > static_cast<std::ptrdiff_t>(kMostPeers); --open) {
+    const auto peer = std::ranges::min_element(peers_, {}, rank);
     peer->leaves = true;
     shutdown(MHD_get_connection_info(peer->connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd,
              SHUT_RDWR);

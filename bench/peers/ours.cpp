@@ -146,9 +146,9 @@ class Ours {
 
   std::string pictures(const std::string& path) {
     const Tensor pictures = compiled_.estimate(windows_).picture;
-    std::vector<std::uint64_t> shape;
-    for (int i = 0; i < 3; ++i) shape.push_back(static_cast<std::uint64_t>(pictures.dim(i)));
-    write_safetensors(path, {}, {{"pictures", "F32", shape, std::as_bytes(pictures.values())}});
+    const std::span<const Dim> shape = pictures.shape().dims().first(3);  // without the channel
+    write_safetensors(path, {},
+                      {{"pictures", "F32", {shape.begin(), shape.end()}, std::as_bytes(pictures.values())}});
     return "done";
   }
 

@@ -145,8 +145,8 @@ Recording simulate_presses(const Sensor& sensor, const Presses& presses, std::ui
   recording.metadata["seed"] = std::to_string(seed);
   recording.truth_height = sensor.array.rows * scale, recording.truth_width = sensor.array.columns * scale;
   for (int i = 0; i < presses.count; ++i) {
-    const std::uint64_t stream =
-        stream_of("press/" + presses.kind + "/" + std::to_string(presses.number) + "/" + std::to_string(i));
+    const std::uint64_t stream = stream_hashed("press/" + presses.kind + "/" +
+                                               std::to_string(presses.number) + "/" + std::to_string(i));
     const RandomStream random(seed, stream);
     Press press(sensor, {presses.kind}, scale, random, RandomStream(seed, stream + 1));
     for (std::uint64_t f = 0; f < kFramesOfAPress; ++f) {
@@ -167,16 +167,16 @@ Recording simulate_touching(const Sensor& sensor, double seconds, std::uint64_t 
   recording.array = sensor.array, recording.body = sensor.body, recording.signal_scale = sensor.scale;
   recording.plate = "touched", recording.trial = recording.pass = 1, recording.source = "simulated";
   const double period = 1 / std::min(sensor.rate_hz, kFastestHz);
-  const RandomStream of_all(seed, stream_of("touching"));
+  const RandomStream of_all(seed, stream_hashed("touching"));
   Scene::Objects objects{.smallest = kMostSmallest * of_all.uniform(0)};
   objects.largest = std::lerp(objects.smallest + kLeastRange, 1.0, of_all.uniform(1));
   double begin = 0;
   for (std::uint64_t i = 0; begin < seconds; ++i) {
-    const RandomStream random(seed, stream_of("touch") + 2 * i);
+    const RandomStream random(seed, stream_hashed("touch") + 2 * i);
     const double length = kShortest * same_bits::pow(kLongest / kShortest, random.uniform(kLength));
     const double end = begin + length + std::lerp(kLeastGap, kMostGap, random.uniform(kGap));
     objects.kind = random.uniform(kByHand) < 0.5 ? "fingertip" : "mixed";
-    Press press(sensor, objects, 2, random, RandomStream(seed, stream_of("touch") + 2 * i + 1),
+    Press press(sensor, objects, 2, random, RandomStream(seed, stream_hashed("touch") + 2 * i + 1),
                 Scene::kSeconds / length);
     for (; period * static_cast<double>(recording.frames()) < std::min(end, seconds);) {
       const double t = period * static_cast<double>(recording.frames());

@@ -47,8 +47,8 @@ constexpr int kRows = static_cast<int>((rig::kPlateLengthMm + 2 * kMarginMm) / k
 double factor(double v) { return v >= 0 ? 1 + v : 1 / (1 - v); }
 
 std::uint64_t pass_stream(const Plate& plate, const PassSettings& pass) {
-  return stream_of(plate.name() + "/" + std::to_string(pass.trial) + "/" + std::to_string(pass.pass) + "/" +
-                   std::to_string(static_cast<long long>(pass.speed_mm_s * 1000)));
+  return stream_hashed(plate.name() + "/" + std::to_string(pass.trial) + "/" + std::to_string(pass.pass) +
+                       "/" + std::to_string(static_cast<long long>(pass.speed_mm_s * 1000)));
 }
 
 }  // namespace
@@ -102,7 +102,7 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
   if (settings_.body.skin_mm == 0) settings_.body.skin_mm = Body::of_rig().skin_mm;
   // Of the sensor, of a trial of a plate (one mounting), and of a pass.
   const RandomStream sensor(seed, 0),
-      trial(seed, stream_of(plate.name() + "/" + std::to_string(of_pass.trial)));
+      trial(seed, stream_hashed(plate.name() + "/" + std::to_string(of_pass.trial)));
   const RandomStream pass(seed, pass_stream(plate, of_pass));
   const double variation = settings.with_variation ? 1 : 0;
   const double spread = variation * settings.gain_spread;

@@ -49,14 +49,13 @@ Batching::Batching(std::vector<std::uint32_t> indices, std::size_t batch, std::u
   batch_ = std::min(batch_, indices_.size());
 }
 
-void Batching::batch(std::uint64_t epoch, std::uint64_t b, std::span<std::uint32_t> out) const {
-  if (b >= batches_per_epoch() || out.size() != batch_)
-    throw std::invalid_argument(refusal("batching", "batch",
-                                        "a number below " + std::to_string(batches_per_epoch()) +
-                                            " and room for " + std::to_string(batch_) + " windows",
-                                        std::to_string(b) + " and room for " + std::to_string(out.size())));
-  const EpochOrder order(indices_.size(), seed_, epoch);
-  for (std::size_t i = 0; i < batch_; ++i) out[i] = indices_[order[b * batch_ + i]];
+void Batching::batch(std::uint64_t step, std::span<std::uint32_t> out) const {
+  if (out.size() != batch_)
+    throw std::invalid_argument(
+        refusal("batching", "out", std::to_string(batch_) + " windows", std::to_string(out.size())));
+  const EpochOrder order(indices_.size(), seed_, step / batches_per_epoch());
+  const std::uint64_t first = step % batches_per_epoch() * batch_;
+  for (std::size_t i = 0; i < batch_; ++i) out[i] = indices_[order[first + i]];
 }
 
 }  // namespace supertac

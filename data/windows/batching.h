@@ -26,10 +26,10 @@ class EpochOrder {
   std::uint64_t keys_[kRounds];
 };
 
-/// Cuts a set of window indices into batches, in a new order each epoch. Batch b of epoch e is a pure
-/// function of (indices, batch size, seed, e, b): a resumed run needs no state but its step number. Every
-/// batch is full; the remainder of indices.size() / batch is left out, others in each epoch. With fewer
-/// indices than the batch size an epoch is one batch of all of them.
+/// Cuts a set of window indices into batches, one for each step, in a new order each epoch of
+/// batches_per_epoch() steps. A batch is a pure function of (indices, batch size, seed, step): a resumed run
+/// needs no other state. Every batch is full; the remainder of indices.size() / batch is left out, others in
+/// each epoch. With fewer indices than the batch size an epoch is one batch of all of them.
 class Batching {
  public:
   /// Throws std::invalid_argument when there is no index or batch < 1.
@@ -37,13 +37,11 @@ class Batching {
   std::size_t batches_per_epoch() const { return indices_.size() / batch_; }
   const std::vector<std::uint32_t>& indices() const { return indices_; }
   std::size_t batch_size() const { return batch_; }
-  /// Writes the batch_size() window indices of a batch. Throws std::invalid_argument on b or the size of
-  /// out.
-  void batch(std::uint64_t epoch, std::uint64_t b, std::span<std::uint32_t> out) const;
+  /// Writes the batch_size() window indices of a step's batch, steps being counted from 0. Throws
+  /// std::invalid_argument when out is of another size.
+  void batch(std::uint64_t step, std::span<std::uint32_t> out) const;
   /// Number of the sample in slot i of that batch, counted since training began: the counter for augment().
-  std::uint64_t sample(std::uint64_t epoch, std::uint64_t b, std::size_t i) const {
-    return (epoch * batches_per_epoch() + b) * batch_ + i;
-  }
+  std::uint64_t sample(std::uint64_t step, std::size_t i) const { return step * batch_ + i; }
 
  private:
   std::vector<std::uint32_t> indices_;

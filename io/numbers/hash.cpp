@@ -31,7 +31,7 @@ std::string hex_digits(std::uint64_t value, std::size_t digits) {
   return text;
 }
 
-std::uint64_t stream_of(std::string_view name) {
+std::uint64_t stream_hashed(std::string_view name) {
   std::uint64_t hash = 1469598103934665603ULL;
   for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
   return hash;

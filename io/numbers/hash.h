@@ -46,9 +46,9 @@ class Hash {
   std::uint64_t state_;
 };
 
-/// FNV-1a with an offset of its own: names the simulator's random streams, whose recordings must stay the
-/// same.
-std::uint64_t stream_of(std::string_view name);
+/// The random stream of a text of any length: FNV-1a with an offset of its own, which simulated recordings
+/// need to stay the same. Of a short name stream_named() (random.h).
+std::uint64_t stream_hashed(std::string_view name);
 
 /// CRC-32 of ISO 3309 (the one of zlib, PNG and Ethernet), by zlib. A long input may be given in parts, each
 /// with the sum of the parts before it as `seed`: crc32(b, crc32(a)) == crc32(a followed by b).

@@ -56,18 +56,19 @@ bool all_simulated(const WindowSet& windows) {
                              [](const WindowSet::Pass& pass) { return pass.source == "simulated"; });
 }
 
-WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std::vector<std::string>& notes) {
+WindowSet windows_of(const Recipe& recipe, const std::string& recordings, const ReadingWatch& watch,
+                     std::vector<std::string>& notes) {
   WindowSettings w;
   w.timesteps = static_cast<int>(recipe.model.timesteps);
   w.scale = static_cast<int>(recipe.model.scale);
   w.rate_hz = recipe.rate_hz;
   w.delay_s = recipe.delay_s;
   w.stride = static_cast<int>(recipe.stride);
-  const SignalRange range = SignalRange::of_folder(folders.data, recipe.plates, folders.watch(folders.data),
-                                                   recipe.range.has_value());
+  const SignalRange range =
+      SignalRange::of_folder(recordings, recipe.plates, watch, recipe.range.has_value());
   if (const std::string found = range.felt().complaint(); !found.empty()) throw std::runtime_error(found);
   w.scaling = scaling_of(recipe, range, notes);
-  WindowSet windows = WindowSet::load(folders.data, recipe.plates, w, folders.watch(folders.data));
+  WindowSet windows = WindowSet::load(recordings, recipe.plates, w, watch);
   const RandomPasses random{.count = static_cast<std::size_t>(recipe.random_plates),
                             .seed = recipe.seed,
                             .speed_mm_s = common_speed(windows),
@@ -139,10 +140,10 @@ Split split_of(const WindowSet& windows, const Recipe& recipe, std::vector<std::
   return split;
 }
 
-TrainingTask window_task(const Recipe& given, const RecordingFolders& folders) {
+TrainingTask window_task(const Recipe& given, const std::string& recordings, const ReadingWatch& watch) {
   given.check();
   std::vector<std::string> notes;
-  const auto windows = std::make_shared<const WindowSet>(windows_of(given, folders, notes));
+  const auto windows = std::make_shared<const WindowSet>(windows_of(given, recordings, watch, notes));
   Recipe recipe = given;
   set_array(recipe.model, windows->array());
   TrainingTask task{.windows = windows, .recipe = recipe};
@@ -239,10 +240,10 @@ void save_trained(const Trainer& trainer, const std::string& path,
   write_checkpoint(path, trainer.model().parameters(), trainer.metadata(origin), more);
 }
 
-bool train(const Recipe& recipe, const RecordingFolders& folders, const std::string& out,
+bool train(const Recipe& recipe, const std::string& recordings, const std::string& out,
            const TrainingCallbacks& callbacks) {
   check_output(out);
-  const TrainingTask task = window_task(recipe, folders);
+  const TrainingTask task = window_task(recipe, recordings);
   Trainer trainer(*task.windows, task.split.train, task.recipe);
   if (!callbacks.checkpoint.empty() && std::filesystem::exists(callbacks.checkpoint))
     trainer.restore(callbacks.checkpoint, task.origin);

@@ -1,6 +1,6 @@
 // The whole training of a recipe: what supertac-train does, as a function of the library.
 //
-//   train(Recipe::named("tiny"), {"recordings"}, "model.safetensors");
+//   train(Recipe::named("tiny"), "recordings", "model.safetensors");
 #pragma once
 
 #include <functional>
@@ -14,13 +14,6 @@
 #include "models/training/trainer.h"
 
 namespace supertac {
-
-/// Where recordings lie.
-struct RecordingFolders {
-  std::string data;
-  /// Gives the watch of a folder's reading.
-  std::function<ReadingWatch(const std::string& folder)> watch = [](const auto&) { return ReadingWatch(); };
-};
 
 struct TrainingTask {
   std::shared_ptr<const WindowSet> windows;
@@ -41,11 +34,12 @@ struct TrainingTask {
 /// Both sides of the recipe's split of these windows, and what it holds out of training.
 Split split_of(const WindowSet& windows, const Recipe& recipe, std::vector<std::uint32_t>& held_out);
 
-/// Reads the recordings, adds random and silent passes, splits. Throws std::invalid_argument as
+/// Reads a folder of recordings, twice, each time watched; adds random and silent passes, splits. Throws
+/// std::invalid_argument as
 /// Recipe::check, and when random plates are asked for though the signals rest at another level than the
 /// recordings state; std::runtime_error as WindowSet::load, and when the signal range clips most of the
 /// signals.
-TrainingTask window_task(const Recipe& recipe, const RecordingFolders& folders);
+TrainingTask window_task(const Recipe& recipe, const std::string& recordings, const ReadingWatch& watch = {});
 
 /// One line of a training's log: means over the steps since the line before.
 struct LogLine : LossTerms {
@@ -86,7 +80,7 @@ void save_trained(const Trainer& trainer, const std::string& path,
 /// All of it: reads the recordings, goes on from `callbacks.checkpoint` where that file exists, trains, and
 /// writes the model. Returns whether all steps are done; otherwise no model is written. Throws as
 /// window_task(), Trainer::restore() and the others above.
-bool train(const Recipe& recipe, const RecordingFolders& folders, const std::string& out,
+bool train(const Recipe& recipe, const std::string& recordings, const std::string& out,
            const TrainingCallbacks& callbacks = {});
 
 }  // namespace supertac

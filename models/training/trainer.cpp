@@ -103,9 +103,6 @@ Trainer::MicroBatch::MicroBatch(const SuperTac& master, Dim noise, Dim first_sam
 // Takes the windows [n,T,signals] and truths [n,H,W,1] of this step, n the samples of a micro-batch, and
 // augments each by the number of its sample.
 void Trainer::fill(MicroBatch& micro_batch) const {
-  const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
-  const std::uint64_t epoch = static_cast<std::uint64_t>(step()) / per_epoch;
-  const std::uint64_t b = static_cast<std::uint64_t>(step()) % per_epoch;
   const auto count = static_cast<std::size_t>(micro_batch.batch.inputs.dim(0));
   const std::size_t input_size = micro_batch.batch.inputs.values().size() / count;
   const std::size_t target_size = micro_batch.batch.targets.values().size() / count;
@@ -118,7 +115,8 @@ void Trainer::fill(MicroBatch& micro_batch) const {
         micro_batch.batch.targets.values().subspan(n * target_size, target_size);
     windows_.truth(indices_[slot], target);
     if (recipe_.augment.any() && windows_.augmentable(indices_[slot]))
-      augment(recipe_.augment, recipe_.seed, batching_.sample(epoch, b, slot), input, windows_.array());
+      augment(recipe_.augment, recipe_.seed, batching_.sample(static_cast<std::uint64_t>(step()), slot),
+              input, windows_.array());
   }
 }
 
@@ -178,9 +176,7 @@ void Trainer::run(MicroBatch& micro_batch) const {
 }
 
 void Trainer::windows_of_step(std::int64_t step, std::span<std::uint32_t> out) const {
-  const auto number = static_cast<std::uint64_t>(step);
-  const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
-  batching_.batch(number / per_epoch, number % per_epoch, out);
+  batching_.batch(static_cast<std::uint64_t>(step), out);
 }
 
 StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMicroBatch& around) {

@@ -251,9 +251,8 @@ TEST_F(Library, TrainsWhatTheCppLibraryTrains) {
   for (const auto& [out, why] :
        {std::pair{folder_ / "data", ": is no name of a file to write a model to"},
         {folder_ / "none/m.safetensors", ": cannot be written: its folder is missing"}})
-    EXPECT_EQ(what_of<FileError>([&, &out = out] { train(recipe, {.data = folder_ / "data"}, out); }),
-              out + why);
-  train(recipe, {.data = folder_ / "data"}, folder_ / "cpp.safetensors");
+    EXPECT_EQ(what_of<FileError>([&, &out = out] { train(recipe, folder_ / "data", out); }), out + why);
+  train(recipe, folder_ / "data", folder_ / "cpp.safetensors");
   const supertac_training settings{
       .size = sizeof(supertac_training), .epochs = 2, .stride = 4, .seed = 5, .split = "none"};
   const std::string data = folder_ / "data", out = folder_ / "c.safetensors";

@@ -4,13 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <numeric>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "autograd/tensor.h"
+#include "autograd/record.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/hash.h"
 #include "layers/checkpoint.h"
@@ -55,12 +54,6 @@ struct Difference {
   std::string worst;  ///< the entry that differs most by its own size, and both its values
 };
 
-inline std::string digits(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.12g", x);
-  return text;
-}
-
 inline Difference difference(std::span<const double> found, std::span<const double> expected) {
   double largest = 0;
   for (const double b : expected) largest = std::max(largest, std::abs(b));
@@ -71,8 +64,8 @@ inline Difference difference(std::span<const double> found, std::span<const doub
     const double floor = std::max({std::abs(expected[i]), 1e-3 * largest, 1e-30});
     const double by_entry = std::isfinite(error) ? error / floor : 1e30;
     if (by_entry > d.by_entry || d.worst.empty())
-      d.worst =
-          "entry " + std::to_string(i) + ": found " + digits(found[i]) + ", expected " + digits(expected[i]);
+      d.worst = "entry " + std::to_string(i) + ": found " + digits(found[i], 12) + ", expected " +
+                digits(expected[i], 12);
     d.by_entry = std::max(d.by_entry, by_entry);
     d.by_tensor = std::isfinite(error) ? std::max(d.by_tensor, error / std::max(largest, 1e-30)) : 1e30;
   }

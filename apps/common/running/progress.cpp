@@ -91,7 +91,7 @@ std::function<void(std::size_t, std::size_t)> progress_of(const Arguments& argum
   return
       [&arguments, what, unit, bar = std::shared_ptr<Progress>()](std::size_t done, std::size_t all) mutable {
         stop_if_interrupted();
-        if (!bar) bar = std::make_shared<Progress>(arguments, what, all, unit);
+        if (!bar || done == 0) bar = std::make_shared<Progress>(arguments, what, all, unit);
         bar->update(done);
       };
 }

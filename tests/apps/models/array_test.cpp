@@ -92,8 +92,7 @@ void write_model(const std::string& path, const TaxelArray& array, Dim timesteps
 TEST_F(Array, ASignalEndsTheFitOfTheBaselines) {
   simulate(16, 16, "2");
   write_model(path("m.safetensors"), {.rows = 16, .columns = 16, .pitch_mm = 2}, 32, 4);
-  RunningProcess running(SUPERTAC_BIN "/supertac-evaluate",
-                         {"--data", path("data"), "--model", path("m.safetensors"), "--split", "none"});
+  RunningProcess running = start("supertac-evaluate --data data --model m.safetensors --split none");
   for (int i = 0; i < 80 && !running.ended(); ++i) usleep(50'000);
   ASSERT_FALSE(running.ended());
   running.send(SIGINT);

@@ -270,7 +270,7 @@ TEST_F(SeveralModels, NetworksThatLeftOutTheSamePlateAreAveraged) {
   const std::string evaluate = "supertac-evaluate --data plates --limit 20 --model left1.safetensors,";
   succeed(evaluate + "left2.safetensors");
   expect_exit(run(evaluate + "other.safetensors"), 1,
-              "by left-out plate 6_Bumps, of another by left-out plate 6_Ridges");
+              "by leaving out 6_Bumps, of another by leaving out 6_Ridges");
 }
 
 }  // namespace supertac::training_test

@@ -49,17 +49,15 @@ class CollectRun {
     settings.printer_running = true;
     return settings;
   }
-  /// Arguments of a collection of one pass over 3_Bumps into out(), with --yes and --quiet, and `more`.
-  std::vector<std::string> arguments(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> words = {"--board",   board(),          "--printer", printer(),  "--plate",
-                                      "3_Bumps",   "--out",          out_,        "--passes", "1",
-                                      "--speedup", format(speedup_), "--yes",     "--quiet"};
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
+  /// A collection of one pass over 3_Bumps into out(), and `more`.
+  std::string line(const std::string& more = "") const {
+    return "supertac-collect --board " + board() + " --printer " + printer() +
+           " --plate 3_Bumps --passes 1 --speedup " + format(speedup_) + " --yes --out " + out_ + " " + more;
   }
+  RunningProcess start(const std::string& more = "--quiet") const { return start_in(disk_, line(more)); }
   /// The whole collection, to its end.
-  ProcessResult collect(const std::vector<std::string>& more = {}, const ProcessOptions& options = {}) const {
-    return run_process("supertac-collect", arguments(more), options);
+  ProcessResult collect(const std::string& more = "", const ProcessOptions& options = {}) const {
+    return run_in(disk_, line("--quiet " + more), options);
   }
 
   FaultyPtyRig& rig() { return rig_; }
@@ -81,11 +79,8 @@ class CollectRun {
   }
   /// A collection that does `then` once it has been in contact for three seconds, to its end.
   ProcessResult collect_until_contact(const std::function<void(RunningProcess&)>& then,
-                                      const std::vector<std::string>& without = {}) {
-    std::vector<std::string> words = arguments();
-    std::erase_if(words,
-                  [&](const std::string& w) { return std::ranges::find(without, w) != without.end(); });
-    RunningProcess program("supertac-collect", words);
+                                      const std::string& more = "--quiet") {
+    RunningProcess program = start(more);
     EXPECT_TRUE(wait_for_contact(3, program));
     then(program);
     return program.wait();
@@ -122,10 +117,5 @@ class CollectRun {
   FaultyPtyRig rig_;
   std::string disk_, out_;  // a real disk where there is one, not the memory of the other temporary folders
 };
-
-/// True for text of exactly one line.
-inline bool is_one_line(const std::string& text) {
-  return !text.empty() && text.find('\n') == text.size() - 1;
-}
 
 }  // namespace supertac

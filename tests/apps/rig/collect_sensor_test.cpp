@@ -59,17 +59,13 @@ class CollectSensor : public testing::Test {
     thread_.join();
   }
 
-  std::vector<std::string> words(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> words = {"--sensor",  run_.disk() + "/mat.json",
-                                      "--bed",     run_.disk() + "/bed.json",
-                                      "--printer", run_.printer(),
-                                      "--plate",   "ridges6",
-                                      "--out",     run_.out(),
-                                      "--speedup", format(run_.speedup()),
-                                      "--yes",     "--quiet"};
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
+  std::string line(const std::string& more = "") const {
+    return "supertac-collect --sensor mat.json --bed bed.json --printer " + run_.printer() +
+           " --plate ridges6 --out " + run_.out() + " --speedup " + format(run_.speedup()) +
+           " --yes --quiet " + more;
   }
+  ProcessResult run(const std::string& line) const { return run_in(run_.disk(), line); }
+  RunningProcess start(const std::string& more = "") const { return start_in(run_.disk(), line(more)); }
   void unplug() {
     const std::lock_guard lock(mutex_);
     mat_->unplug();
@@ -146,7 +142,7 @@ class CollectLateSensor : public CollectSensor {
 };
 
 TEST_F(CollectSensor, ItsPassesAreRecordingsAndItsJournalGivesTheSame) {
-  const ProcessResult result = run_process("supertac-collect", words());
+  const ProcessResult result = run(line());
   ASSERT_EQ(result.code, 0) << result.error;
   EXPECT_EQ(run_.files(),
             "provenance.jsonl ridges6_t1_p1_v20.safetensors ridges6_t1_p2_v20.safetensors "
@@ -171,17 +167,14 @@ TEST_F(CollectSensor, ItsPassesAreRecordingsAndItsJournalGivesTheSame) {
       run_.disk(),
       "supertac-train --data out --preset tiny --split pass --epochs 1 --out model.safetensors --quiet");
   // The journal replays as a stream of this sensor.
-  const auto latency_of = [&](std::vector<std::string> words) {
-    for (const char* word : {"--quiet", "--json", "-"}) words.emplace_back(word);
-    const ProcessResult streamed = run_process("supertac-stream", words);
-    EXPECT_EQ(streamed.code, 0) << streamed.error;
+  const auto latency_of = [&](const std::string& more) {
+    const ProcessResult streamed = succeed_in(run_.disk(), "supertac-stream --quiet --json - " + more);
     return nlohmann::json::parse(streamed.out)["latency_ms"]["median"].get<double>();
   };
   // Recorded arrivals by today's clock, and those of a clock that is sped up by one that is not, are hours
   // apart.
-  const std::string mat = run_.disk() + "/mat.json";
-  for (const double median_ms : {latency_of({"--replay", journal(), "--record", run_.disk() + "/streamed"}),
-                                 latency_of({"--sensor", mat, "--speedup", "5", "--seconds", "0.5"})}) {
+  for (const double median_ms : {latency_of("--record streamed --replay " + journal()),
+                                 latency_of("--sensor mat.json --speedup 5 --seconds 0.5")}) {
     EXPECT_GT(median_ms, 0);
     EXPECT_LT(median_ms, 60'000);
   }
@@ -192,17 +185,13 @@ TEST_F(CollectSensor, ItsPassesAreRecordingsAndItsJournalGivesTheSame) {
 }
 
 TEST_F(CollectLateSensor, APassOfWhichNoFrameIsDatedIsAnErrorThatKeepsTheJournal) {
-  const ProcessResult result = run_process("supertac-collect", words({"--passes", "1"}));
-  EXPECT_EQ(result.code, 1);
-  EXPECT_TRUE(is_one_line(result.error)) << result.error;
-  EXPECT_TRUE(contains(result.error, "1 passes without a recording, no frame being dated; collect again"));
-  const ProcessResult imported = run_in(run_.disk(), "supertac-import --out again --journal " + journal());
-  EXPECT_EQ(imported.code, 1);
-  EXPECT_TRUE(contains(imported.error, "no frame being dated; keep it")) << imported.error;
+  expect_failure(run(line("--passes 1")), 1,
+                 "1 passes without a recording, no frame being dated; collect again");
+  expect_exit(run("supertac-import --out again --journal " + journal()), 1, "no frame being dated; keep it");
 }
 
 TEST_F(CollectSensor, AfterAKillTheJournalAloneIsEnough) {
-  RunningProcess program("supertac-collect", words());
+  RunningProcess program = start();
   ASSERT_TRUE(run_.wait_for_contact(3, program)) << program.wait().error;
   program.send(SIGKILL);
   (void)program.wait();
@@ -213,7 +202,7 @@ TEST_F(CollectSensor, AfterAKillTheJournalAloneIsEnough) {
   std::string bytes = read_text_file(journal(), 1 << 30);
   bytes[bytes.size() / 2] ^= 1;
   write_file(journal(), bytes);
-  const ProcessResult damaged = run_in(run_.disk(), "supertac-import --out damaged --journal " + journal());
+  const ProcessResult damaged = run("supertac-import --out damaged --journal " + journal());
   EXPECT_TRUE(contains(damaged.out, " frames recovered"));
   EXPECT_TRUE(contains(damaged.out, "s, are missing; the collection was cut off"));
   const Recording recording = read_recording(run_.disk() + "/again/ridges6_t1_p1_v20.safetensors");
@@ -225,7 +214,7 @@ TEST_F(CollectSensor, AfterAKillTheJournalAloneIsEnough) {
 
 TEST_F(CollectSensor, UnpluggedInContactItLeavesTheFingerUp) {
   const int port = free_port();
-  RunningProcess program("supertac-collect", words({"--web", std::to_string(port)}));
+  RunningProcess program = start("--web " + std::to_string(port));
   const std::unique_ptr<HttpClient> page = connect_when_up(port);
   ASSERT_TRUE(page);
   page->send("GET /events HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) + "\r\n\r\n");
@@ -236,39 +225,33 @@ TEST_F(CollectSensor, UnpluggedInContactItLeavesTheFingerUp) {
   EXPECT_TRUE(contains(seen, "\"x\":15.0,\"y\":"));
   unplug();
   const ProcessResult result = program.wait();
-  EXPECT_EQ(result.code, 1);
-  EXPECT_TRUE(is_one_line(result.error)) << result.error;
-  EXPECT_TRUE(contains(result.error, "/mat: the device is gone"));
+  expect_failure(result, 1, "/mat: the device is gone");
   EXPECT_GE(run_.head().z, kLiftedZ - 0.01);
   EXPECT_GT(read_recording(run_.out() + "/ridges6_t1_p1_v20.safetensors").frames(), 50U);
 }
 
 TEST_F(CollectSensor, WhatCannotBeIsRefusedBeforeAnythingMoves) {
   const Point3 before = run_.head();
-  const auto refuse = [&](const std::vector<std::string>& more, int code, const std::string& says) {
-    const ProcessResult result = run_process("supertac-collect", words(more));
-    EXPECT_EQ(result.code, code) << result.error;
-    EXPECT_TRUE(is_one_line(result.error)) << result.error;
-    EXPECT_TRUE(contains(result.error, says));
+  const auto refuse = [&](const std::string& more, int code, const std::string& says) {
+    expect_failure(run(line(more)), code, says);
     EXPECT_FALSE(std::filesystem::exists(run_.out()));
   };
-  const std::string bed = run_.disk() + "/small.json";
+  const std::string bed = "--bed small.json", small = run_.disk() + "/small.json";
   std::string text = kBed;
-  write_file(bed, text.replace(text.find("420"), 3, "385"));
-  refuse({"--bed", bed}, 1, "Y expected 200.00 to 385.00 mm, found 390.00; nothing was sent");
-  refuse({"--passes", "30"}, 1, "X342.00 Y310.00 Z95.00, below Z95.00 and beside the plate");
-  write_file(bed, R"({"plate": [300, 310]})");
-  refuse({"--bed", bed}, 1, "small.json: \"plate\" must be three numbers of mm");
-  refuse({"--board", run_.board()}, 2, "--board: only with the rig's board");
+  write_file(small, text.replace(text.find("420"), 3, "385"));
+  refuse(bed, 1, "Y expected 200.00 to 385.00 mm, found 390.00; nothing was sent");
+  refuse("--passes 30", 1, "X342.00 Y310.00 Z95.00, below Z95.00 and beside the plate");
+  write_file(small, R"({"plate": [300, 310]})");
+  refuse(bed, 1, "small.json: \"plate\" must be three numbers of mm");
+  refuse("--board " + run_.board(), 2, "--board: only with the rig's board");
   Sensor other = sensor_;
   const auto with_port = [&](const std::string& port) {
     other.port = port;
-    const std::string path = run_.disk() + "/other.json";
-    write_sensor(OutputPath(path), other);
-    return path;
+    write_sensor(OutputPath(run_.disk() + "/other.json"), other);
+    return std::string("--sensor other.json");
   };
-  refuse({"--sensor", with_port("udp::5005")}, 2, "--speedup: only with a sensor at a serial port");
-  refuse({"--speedup", "1", "--sensor", with_port(run_.disk() + "/mat.json")}, 1, "is a file");
+  refuse(with_port("udp::5005"), 2, "--speedup: only with a sensor at a serial port");
+  refuse("--speedup 1 " + with_port(run_.disk() + "/mat.json"), 1, "is a file");
   EXPECT_EQ(run_.head(), before);
 }
 

@@ -54,12 +54,12 @@ TEST(Trainer, LearnsFromAugmentedWindows) {
   Trainer trainer = small.trainer();
   const Batching batching(all_of(windows), 8, settings.seed);
   std::vector<std::uint32_t> indices(8);
-  batching.batch(0, 0, indices);
+  batching.batch(0, indices);
   Batch by_hand{Tensor(trainer.model().input_shape(8)), Tensor(trainer.model().picture_shape(8)), {}};
   for (std::size_t n = 0; n < 8; ++n) {
     const auto window = by_hand.inputs.values().subspan(n * windows.input_size(), windows.input_size());
     windows.window(indices[n], window);
-    augment(settings.augment, settings.seed, batching.sample(0, 0, n), window);
+    augment(settings.augment, settings.seed, batching.sample(0, n), window);
     const auto truth = by_hand.targets.values().subspan(n * 64, 64);
     windows.truth(indices[n], truth);
   }
