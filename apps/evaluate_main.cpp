@@ -4,7 +4,6 @@
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
-#include "apps/common/running/signals.h"
 #include "apps/evaluate/exports.h"
 #include "apps/evaluate/scoring.h"
 #include "apps/train/training_options.h"
@@ -82,8 +81,9 @@ TestScores score_all(const Arguments& a, const Ensemble& network, const ModelFil
   const std::vector<std::uint32_t>& test = tested.split.test;
   TestScores scores(windows, file, kinds, 1 + baselines.size());
   std::vector<std::vector<float>> plain(baselines.size(), std::vector<float>(windows.image().pixels()));
-  Progress progress(a, "evaluating", test.size(), "pictures");
+  const auto progress = progress_of(a, "evaluating", "pictures");
   for_each_output(network, windows, test, [&](const EvaluatedBatch& b) {
+    progress(b.first, test.size());
     for (std::size_t n = 0; n < b.size(); ++n) {
       Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.predicted_error(n), b.input(n)};
       for (std::size_t k = 0; k < baselines.size(); ++k) {
@@ -93,10 +93,8 @@ TestScores score_all(const Arguments& a, const Ensemble& network, const ModelFil
       score(drawn, windows, scores);
       if (outputs != nullptr) outputs->add(drawn);
     }
-    progress.update(b.first + b.size());
-    return !interrupted();
+    return true;
   });
-  stop_if_interrupted();
   scores.map.finish();
   return scores;
 }

@@ -6,7 +6,6 @@
 #include "apps/check/gradient_cases.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/progress.h"
-#include "apps/common/running/signals.h"
 #include "autograd/record.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
@@ -30,15 +29,15 @@ int run(Arguments& a) {
   Json rows = Json::array();
   std::size_t wrong = 0;
   Dim all = 0;
-  Progress progress(a, "checking", cases.size(), "cases");
+  const auto progress = progress_of(a, "checking", "cases");
   for (auto c = cases.begin(); c != cases.end();) {  // a row for the cases of one name
     Json row = {{"kind", c->kind}, {"name", c->name}};
     Dim entries = 0;
     GradientEntry worst{};
     std::vector<std::string> reports;  // of cases with wrong entries, ten entries each
     for (const std::string& name = row["name"].get_ref<std::string&>(); c != cases.end() && c->name == name;
-         progress.update(static_cast<std::uint64_t>(++c - cases.begin()))) {
-      stop_if_interrupted();
+         ++c) {
+      progress(static_cast<std::size_t>(c - cases.begin()), cases.size());
       const GradientReport report = c->check();
       if (entries == 0 || report.max_relative_error > worst.relative_error) worst = report.worst.front();
       if (report.wrong > 0) reports.push_back(report.text());

@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -76,9 +75,7 @@ Finding group() {
       "sudo sh -c 'supertac check udev > /etc/udev/rules.d/60-supertac.rules', then plug the sensor in anew";
   const std::string name = numbers.contains("dialout") ? "dialout" : "uucp";
   if (!numbers.contains(name)) return {"serial ports' group", "none", ::geteuid() == 0 ? "" : rule};
-  std::vector<gid_t> mine(static_cast<std::size_t>(std::max(0, ::getgroups(0, nullptr))));
-  if (::getgroups(static_cast<int>(mine.size()), mine.data()) < 0) mine.clear();
-  if (::geteuid() == 0 || std::ranges::find(mine, numbers[name]) != mine.end())
+  if (::geteuid() == 0 || ::group_member(static_cast<gid_t>(numbers[name])) != 0)
     return {"serial ports' group", name, ""};
   return {"serial ports' group", "not in " + name,
           "ports cannot be opened: sudo usermod -aG " + name + " $USER, then log in anew; or " + rule};

@@ -18,35 +18,28 @@
 namespace supertac {
 namespace {
 
-// What decides which windows a split tests: the plates (of split group the groups) that were left out, or the
-// seed.
-std::string drawn_by(const ModelFile& file) {
-  const std::string names = value_or(file.metadata, "leave_out");
-  return names.empty() ? "seed " + value_or(file.metadata, "seed", "0") : "leaving out " + names;
-}
-
 bool is_drawn(const std::string& split) { return split != "trial" && split != "none"; }
 
-// Whether the windows that are tested are not those that this model's training kept away.
-bool is_another(const TestSet& tested, const ModelFile& file) {
-  const bool by_seed = is_drawn(tested.split_name) && value_or(file.metadata, "leave_out").empty();
-  return tested.split_name != value_or(file.metadata, "split", "none") ||
-         (by_seed && std::to_string(tested.seed) != value_or(file.metadata, "seed", "0"));
+// "trial", "pass (seed 3)", "texture (leaving out 6_Bumps)": a split and what decides which windows it tests.
+std::string described(const std::string& split, const std::string& left_out, const std::string& seed) {
+  if (!is_drawn(split)) return split;
+  return split + (left_out.empty() ? " (seed " + seed + ")" : " (leaving out " + left_out + ")");
+}
+std::string described(const ModelFile& file) {
+  return described(value_or(file.metadata, "split", "none"), value_or(file.metadata, "leave_out"),
+                   value_or(file.metadata, "seed", "0"));
 }
 
-void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_name) {
-  const std::string split = value_or(files.front().metadata, "split", "none");
+// A split that is not drawn tests the same windows whatever was drawn for the trainings.
+void refuse_leak(const std::vector<ModelFile>& files, const std::string& tested_split) {
+  const auto kept_away = [&](const ModelFile& file) {
+    return is_drawn(tested_split) ? described(file) : value_or(file.metadata, "split", "none");
+  };
   for (const ModelFile& file : files)
-    if (const std::string other = value_or(file.metadata, "split", "none"); other != split)
+    if (const std::string one = kept_away(files.front()), other = kept_away(file); other != one)
       throw std::runtime_error(
-          "one model was trained with split " + split + ", another with " + other +
+          "one model was trained with split " + one + ", another with " + other +
           ": what one is tested on the other may have seen; average models of one split");
-  if (!is_drawn(split_name)) return;
-  for (const ModelFile& file : files)
-    if (drawn_by(file) != drawn_by(files.front()))
-      throw std::runtime_error("split " + split_name + " of one model was drawn by " +
-                               drawn_by(files.front()) + ", of another by " + drawn_by(file) +
-                               ": what one is tested on the other has seen; average models of one split");
 }
 
 /// Over some windows in contact.
@@ -97,14 +90,12 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, con
     a.note(
         "the model was trained with split none: if these are the recordings of its training, it has seen "
         "every one of them");
-  const std::string own = value_or(files.front().metadata, "split", "none");
-  const auto said = [](const std::string& split, const std::string& by) {
-    return is_drawn(split) ? split + " (" + by + ")" : split;
-  };
-  if (own != "none" && tested.split_name != "none" && is_another(tested, files.front()))
+  const std::string own = described(files.front()),
+                    here =
+                        described(tested.split_name, joined(tested.leave_out), std::to_string(tested.seed));
+  if (own != "none" && tested.split_name != "none" && here != own)
     a.note(
-        "the model was trained with split " + said(own, drawn_by(files.front())) + ", tested is split " +
-        said(tested.split_name, "seed " + std::to_string(tested.seed)) +
+        "the model was trained with split " + own + ", tested is split " + here +
         ": if these are the recordings of its training, it has seen some of these windows; without --split "
         "and --seed those that it has not seen are tested");
   if (!a.given("split") && files.front().metadata.contains("interval_factor_found"))

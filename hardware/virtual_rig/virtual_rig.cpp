@@ -132,13 +132,13 @@ PlainRig::PlainRig(FingerSignals signals, double t)
       now_s_(t),
       zero_(rig::kMounted) {}
 
-double PlainRig::next_event() const { return std::min(next_frame(), held_ ? held_until_s_ : next_frame()); }
+double PlainRig::next_event() const { return std::min(next_frame(), held_until_s_.value_or(next_frame())); }
 
 void PlainRig::advance(double t) {
   for (double next = next_event(); next <= t; next = next_event()) {
     now_s_ = std::max(now_s_, next);
-    if (held_ && held_until_s_ <= next) {
-      held_ = false;
+    if (held_until_s_ && *held_until_s_ <= next) {
+      held_until_s_.reset();
       output_ += "ok\n";
       run_waiting();
     } else {
@@ -176,7 +176,7 @@ void PlainRig::take_line(const std::string& line) {
   const std::string code = code_of(*command);
   if (code == "M410") {  // acts ahead of the queue, and holds what comes behind it
     motion_.stop(now_s_);
-    held_until_s_ = now_s_;
+    if (held_until_s_) held_until_s_ = now_s_;
   }
   if (code == "M112") {
     motion_.stop(now_s_);
@@ -189,11 +189,11 @@ void PlainRig::take_line(const std::string& line) {
 }
 
 void PlainRig::run_waiting() {
-  while (!held_ && !waiting_.empty()) {
+  while (!held_until_s_ && !waiting_.empty()) {
     const std::string command = waiting_.front();
     waiting_.pop_front();
     output_ += answer_to(command);
-    if (!held_) output_ += "ok\n";
+    if (!held_until_s_) output_ += "ok\n";
   }
 }
 
@@ -214,7 +214,6 @@ std::string PlainRig::answer_to(const std::string& command) {
     return "FIRMWARE_NAME:Marlin 2.1.2 (virtual rig) PROTOCOL_VERSION:1.0\nCap:EMERGENCY_PARSER:1\n";
   } else if (code == "G28" || code == "M400" || code == "M410") {
     if (code == "G28") motion_.home(now_s_), zero_ = {};
-    held_ = true;
     held_until_s_ = code == "M410" ? now_s_ + kStopHoldsS : std::max(now_s_, motion_.end_time());
   } else if (code != "M110" && code != "M108") {
     return "echo:Unknown command: \"" + command + "\"\n";

@@ -111,14 +111,15 @@ class PlainRig : public RigAtPorts {
 
   FingerSignals signals_;
   MotionQueue motion_;
-  double start_s_, now_s_, held_until_s_ = -1;  // by the command that runs
-  Point3 zero_;                                 // logical = physical - zero
+  double start_s_, now_s_;
+  std::optional<double> held_until_s_;  // by the command that runs
+  Point3 zero_;                         // logical = physical - zero
   double feed_mm_s_ = rig::kSlideMmS;
   NumberedLines lines_;
   std::deque<std::string> waiting_;  // commands
   std::string partial_, output_;
   std::uint64_t frames_ = 0;
-  bool held_ = false, halted_ = false;
+  bool halted_ = false;
 };
 
 /// The master side of a pseudo-terminal, its slave side linked at `link`.

@@ -22,6 +22,7 @@
 #include "models/files/model_file.h"
 #include "tests/apps/hostile/hostile.h"
 #include "tests/fuzz/journal_properties.h"
+#include "tests/support/tensor_file.h"
 
 namespace supertac {
 namespace {
@@ -48,88 +49,56 @@ void lie_in(Bytes& bytes, const RandomStream& random) {
   }
 }
 
-/// A file of tensors whose one entry says something else: a text of its metadata, values, rows, a shape, a
-/// name.
-class TensorFile {
- public:
-  explicit TensorFile(const SafetensorsFile& good) : metadata_(good.metadata()) {
-    for (const auto& [name, info] : good.tensors()) {
-      const auto bytes = good.bytes(name);
-      tensors_.push_back({name, info.dtype, info.shape, {bytes.begin(), bytes.end()}});
+void lie_in_json(nlohmann::ordered_json& value, const RandomStream& random) {
+  if (value.is_structured() && !value.empty() && random.bits(12) % 2 == 0) {
+    auto part = value.begin();
+    std::advance(part, static_cast<std::ptrdiff_t>(random.bits(13) % value.size()));
+    value = *part;
+  } else if (random.bits(14) % 3 == 0) {
+    value = evil_value(random, 15);
+  } else if (random.bits(14) % 3 == 1) {
+    value = evil_number(random, 16);
+  } else {
+    value = static_cast<std::int64_t>(random.bits(17)) - (std::int64_t{1} << 31);
+  }
+}
+
+// Of a text that is JSON one value in it; of another all.
+void lie_in_text(std::string& text, const RandomStream& random) {
+  try {
+    auto json = nlohmann::ordered_json::parse(text);
+    if (json.is_object() && !json.empty()) {
+      auto value = json.begin();
+      std::advance(value, static_cast<std::ptrdiff_t>(random.bits(10) % json.size()));
+      lie_in_json(*value, random);
+      text = json.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
+      return;
     }
-    std::ranges::sort(tensors_, {}, [&](const Entry& t) { return good.tensors().at(t.name).begin; });
+  } catch (const nlohmann::json::exception&) {  // no JSON
   }
+  text = evil_value(random, 11);
+}
 
-  void lie(const RandomStream& random) {
-    Entry& tensor = tensors_[random.bits(0) % tensors_.size()];
-    const std::uint32_t what = random.bits(1) % 8;
-    if (what < 3 && !metadata_.empty()) {
-      auto entry = metadata_.begin();
-      std::advance(entry, static_cast<std::ptrdiff_t>(random.bits(2) % metadata_.size()));
-      lie_in_text(entry->second, random);
-    } else if (what < 6) {
-      tensor.dtype == "F64" ? lie_in<double>(tensor.bytes, random) : lie_in<float>(tensor.bytes, random);
-    } else if (what == 6 && !tensor.shape.empty() && tensor.shape[0] > 0) {
-      const std::uint64_t row = tensor.bytes.size() / tensor.shape[0];
-      const std::uint64_t rows = random.bits(3) % 2 == 0 ? tensor.shape[0] - 1 : tensor.shape[0] + 1;
-      tensor.bytes.resize(rows * row), tensor.shape[0] = rows;
-    } else if (random.bits(4) % 2 == 0) {
-      std::ranges::reverse(tensor.shape);
-    } else {
-      tensor.name += "x";
-    }
+// One entry says something else: a text of the metadata, values, rows, a shape, a name.
+void lie_in_file(TensorFile& file, const RandomStream& random) {
+  TensorFile::Entry& tensor = file.tensors[random.bits(0) % file.tensors.size()];
+  const std::uint32_t what = random.bits(1) % 8;
+  if (what < 3 && !file.metadata.empty()) {
+    auto entry = file.metadata.begin();
+    std::advance(entry, static_cast<std::ptrdiff_t>(random.bits(2) % file.metadata.size()));
+    lie_in_text(entry->second, random);
+  } else if (what < 6) {
+    tensor.dtype == "F64" ? lie_in<double>(tensor.bytes, random) : lie_in<float>(tensor.bytes, random);
+  } else if (what == 6 && !tensor.shape.empty() && tensor.shape[0] > 0) {
+    const std::uint64_t row = tensor.bytes.size() / tensor.shape[0];
+    const std::uint64_t rows = random.bits(3) % 2 == 0 ? tensor.shape[0] - 1 : tensor.shape[0] + 1;
+    tensor.bytes.resize(rows * row), tensor.shape[0] = rows;
+  } else if (random.bits(4) % 2 == 0) {
+    std::ranges::reverse(tensor.shape);
+  } else {
+    tensor.name += "x";
   }
-
-  void write(const std::string& path) const {
-    std::vector<TensorToWrite> tensors;
-    for (const Entry& t : tensors_) tensors.push_back({t.name, t.dtype, t.shape, t.bytes});
-    auto metadata = metadata_;
-    for (const char* own : {"supertac_format", "checksum"}) metadata.erase(own);
-    write_safetensors(path, metadata, tensors);
-  }
-
- private:
-  struct Entry {
-    std::string name, dtype;
-    std::vector<std::uint64_t> shape;
-    Bytes bytes;
-  };
-
-  // Of a text that is JSON one value in it; of another all.
-  static void lie_in_text(std::string& text, const RandomStream& random) {
-    try {
-      auto json = nlohmann::ordered_json::parse(text);
-      if (json.is_object() && !json.empty()) {
-        auto value = json.begin();
-        std::advance(value, static_cast<std::ptrdiff_t>(random.bits(10) % json.size()));
-        lie_in_json(*value, random);
-        text = json.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
-        return;
-      }
-    } catch (const nlohmann::json::exception&) {  // no JSON
-    }
-    text = evil_value(random, 11);
-  }
-
- public:
-  static void lie_in_json(nlohmann::ordered_json& value, const RandomStream& random) {
-    if (value.is_structured() && !value.empty() && random.bits(12) % 2 == 0) {
-      auto part = value.begin();
-      std::advance(part, static_cast<std::ptrdiff_t>(random.bits(13) % value.size()));
-      value = *part;
-    } else if (random.bits(14) % 3 == 0) {
-      value = evil_value(random, 15);
-    } else if (random.bits(14) % 3 == 1) {
-      value = evil_number(random, 16);
-    } else {
-      value = static_cast<std::int64_t>(random.bits(17)) - (std::int64_t{1} << 31);
-    }
-  }
-
- private:
-  std::map<std::string, std::string> metadata_;
-  std::vector<Entry> tensors_;
-};
+}
 
 /// What follows reading; a plain runtime_error is a message of ours.
 void expect_typed(const std::function<void()>& use) {
@@ -178,7 +147,7 @@ void use_sensor(const RandomStream& random) {
       value->is_object() && random.bits(1) % 4 != 0
           ? (*value)[std::array{"kind", "header", "type", "endian", "checksum", "time"}[random.bits(2) % 6]]
           : *value;
-  TensorFile::lie_in_json(part, random);
+  lie_in_json(part, random);
   const Sensor sensor =
       sensor_of_json(json.dump(2, ' ', true, nlohmann::ordered_json::error_handler_t::replace), "sensor");
   sensor.check();
@@ -266,7 +235,7 @@ Counts lying_files(const std::string& folder, std::uint64_t n, std::uint64_t see
           what + "journal", [&] { expect_typed([&] { use_journal(path, random); }); }, counts);
     } else {
       TensorFile file(*kinds[which].good);
-      file.lie(random);
+      lie_in_file(file, random);
       try {
         file.write(path);
       } catch (const std::invalid_argument&) {  // no such file can be written

@@ -4,9 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "io/files/safetensors.h"
-
 #include "tests/apps/common/expect.h"
+#include "tests/support/tensor_file.h"
 #include "tests/support/test.h"
 
 namespace supertac::chain_test {
@@ -51,31 +50,21 @@ class Chain : public Training {
   // A bit of the model, whose checksum is then made anew, as somebody who wants to deceive would do: of a
   // tensor whose name begins so, or does not, or of a field of the metadata.
   void flip_in_model(const std::string& begin, bool begins, bool metadata) {
-    const std::string name = path("changed/model.safetensors");
-    const SafetensorsFile file = SafetensorsFile::read(path("model.safetensors"));
-    auto fields = file.metadata();
-    fields.erase("checksum"), fields.erase("supertac_format");
-    std::vector<std::string> contents;
-    std::vector<TensorToWrite> tensors;
-    for (const auto& [key, info] : file.tensors()) {
-      const auto found = file.bytes(key);
-      contents.emplace_back(reinterpret_cast<const char*>(found.data()), found.size());
-      tensors.push_back({key, info.dtype, info.shape, {}});
-    }
+    TensorFile file(SafetensorsFile::read(path("model.safetensors")));
     for (bool done = false; !done;) {
       if (metadata) {
-        const auto field = std::next(fields.begin(), static_cast<std::ptrdiff_t>(drawn(fields.size())));
+        const auto field =
+            std::next(file.metadata.begin(), static_cast<std::ptrdiff_t>(drawn(file.metadata.size())));
         if (field->second.empty() || field->first == "provenance") continue;
         flip(field->second, drawn(field->second.size()), 5);
       } else {
-        const std::size_t tensor = drawn(tensors.size());
-        if (tensors[tensor].name.starts_with(begin) != begins) continue;
-        flip(contents[tensor], drawn(contents[tensor].size()));
+        TensorFile::Entry& tensor = file.tensors[drawn(file.tensors.size())];
+        if (tensor.name.starts_with(begin) != begins) continue;
+        tensor.bytes[drawn(tensor.bytes.size())] ^= static_cast<std::byte>(1U << drawn(8));
       }
       done = true;
     }
-    for (std::size_t i = 0; i < tensors.size(); ++i) tensors[i].data = std::as_bytes(std::span(contents[i]));
-    write_safetensors(name, fields, tensors);
+    file.write(path("changed/model.safetensors"));
   }
   // What is named, by the link of which one bit is changed.
   void plant(const std::string& link, std::size_t number) {

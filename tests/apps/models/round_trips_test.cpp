@@ -5,8 +5,8 @@
 #include "data/sensors/sensor.h"
 #include "hardware/collection/journal.h"
 #include "io/files/json.h"
-#include "io/files/safetensors.h"
 #include "tests/apps/common/expect.h"
+#include "tests/support/tensor_file.h"
 #include "tests/support/test.h"
 
 namespace supertac::round_trips_test {
@@ -19,11 +19,7 @@ class RoundTrips : public Training {
  protected:
   static void safetensors(const std::string& from, const std::string& to) {
     const SafetensorsFile file = SafetensorsFile::read(from);
-    std::vector<TensorToWrite> tensors;
-    for (const auto& [name, info] : file.tensors())
-      tensors.push_back({name, info.dtype, info.shape, file.bytes(name)});
-    std::ranges::sort(tensors, {}, [&](const TensorToWrite& t) { return file.tensors().at(t.name).begin; });
-    write_safetensors(to, file.metadata(), tensors);
+    TensorFile(file).write(to);
     const std::string kind = value_or(file.metadata(), "kind");
     ++kinds_[kind];
     if (kind != "recording") return;

@@ -244,8 +244,8 @@ TEST_F(SeveralModels, AreAveragedUnlessTheySawEachOthersTest) {
   trained(one, "--seed 1 --split pass");
   trained(two, "--seed 2 --split pass");
   trained(all, "--split none");
-  expect_exit(run(evaluate + one + "," + two), 1, "drawn by seed 1, of another by seed 2");
-  expect_exit(run(evaluate + one + "," + all), 1, "split pass, another with none");
+  expect_exit(run(evaluate + one + "," + two), 1, "with split pass (seed 1), another with pass (seed 2)");
+  expect_exit(run(evaluate + one + "," + all), 1, "split pass (seed 1), another with none");
   succeed(evaluate + one + "," + all + " --split none");
   EXPECT_TRUE(contains(run(evaluate + all).error, "it has seen every one of them"));
 
@@ -270,7 +270,7 @@ TEST_F(SeveralModels, NetworksThatLeftOutTheSamePlateAreAveraged) {
   const std::string evaluate = "supertac-evaluate --data plates --limit 20 --model left1.safetensors,";
   succeed(evaluate + "left2.safetensors");
   expect_exit(run(evaluate + "other.safetensors"), 1,
-              "by leaving out 6_Bumps, of another by leaving out 6_Ridges");
+              "texture (leaving out 6_Bumps), another with texture (leaving out 6_Ridges)");
 }
 
 }  // namespace supertac::training_test
