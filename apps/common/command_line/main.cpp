@@ -168,8 +168,7 @@ int parse_and_run(int argc, const char* const* argv) {
   if (program_kernels != nullptr && program_kernels().second)
     std::cerr << program_name + std::string(
                                     ": this processor has no fused multiply-add: results are the same, but "
-                                    "computing takes many "
-                                    "times longer\n");
+                                    "computing takes many times longer\n");
   const int code = run(arguments);
   if (interrupted()) return 128 + interrupting_signal();
   return code == kExitOk && arguments.displaced() ? kExitFailed : code;
