@@ -105,8 +105,10 @@ int check_file(const Arguments& a) {
 int check_chain(const Arguments& a) {
   const fs::path header_file = a.text("OTHER"), source_file = fs::path(header_file).replace_extension(".c");
   const std::string header = read_text_file(header_file, kMostBytes),
-                    source = read_text_file(source_file, kMostBytes),
-                    picture = stated_in(header, "_SELF_TEST 0x").substr(0, 16);
+                    source = read_text_file(source_file, kMostBytes), mark = "_SELF_TEST 0x";
+  const std::size_t mark_at = header.find(mark);
+  // Its sixteen characters, whatever they are: no other link is to be blamed for a digit that is a blank.
+  const std::string picture = mark_at == std::string::npos ? "" : header.substr(mark_at + mark.size(), 16);
   const double stated_hz = parse_double(stated_in(header, "_SENSOR_HZ ")).value_or(0),
                sensor_hz = stated_hz >= 1 && stated_hz <= 100'000 ? stated_hz : 0;
   Links links(a);
