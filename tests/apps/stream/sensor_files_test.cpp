@@ -1,9 +1,7 @@
 // Every file of examples/sensors/ against a device that sends such frames: probed, viewed, recorded, read
 // back. Then from simulated passes of one of them to live pictures.
 #include <fcntl.h>
-#include <netinet/in.h>
 #include <pty.h>
-#include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -21,6 +19,7 @@
 #include "io/numbers/text.h"
 #include "tests/apps/common/expect.h"
 #include "tests/hardware/fake_sensor.h"
+#include "tests/support/sockets.h"
 #include "tests/support/test.h"
 
 namespace supertac::sensor_files_test {
@@ -68,21 +67,14 @@ class FakeDevice {
     port_ = "serial:" + std::string(name) + sensor_.port.substr(sensor_.port.rfind('@'));
   }
   void open_socket(int type, const std::string& prefix) {
-    const int file = socket(AF_INET, type | SOCK_NONBLOCK, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET, address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof address;
-    ASSERT_EQ(bind(file, reinterpret_cast<sockaddr*>(&address), size), 0);
-    ASSERT_EQ(getsockname(file, reinterpret_cast<sockaddr*>(&address), &size), 0);
-    port_ = prefix + std::to_string(ntohs(address.sin_port));
-    if (type == SOCK_STREAM) {
-      ASSERT_EQ(::listen(file, 1), 0);
-      listening_ = file;
-      return;
-    }
-    out_ = socket(AF_INET, SOCK_DGRAM, 0);
-    EXPECT_EQ(connect(out_, reinterpret_cast<sockaddr*>(&address), size), 0);
-    close(file);  // the program listens there
+    const int port = free_port(type);
+    const sockaddr_in address = at_port(port);
+    const auto* const at = reinterpret_cast<const sockaddr*>(&address);
+    port_ = prefix + std::to_string(port);
+    int& file = type == SOCK_STREAM ? listening_ : out_;  // of datagrams the program is who listens
+    file = socket(AF_INET, type | SOCK_NONBLOCK, 0);
+    ASSERT_TRUE(type == SOCK_DGRAM ? connect(file, at, sizeof address) == 0
+                                   : bind(file, at, sizeof address) == 0 && ::listen(file, 1) == 0);
   }
   void open_fifo() {
     port_ = folder_ / "fifo";

@@ -1,12 +1,8 @@
 // A client for tests that sends what it is told, right or wrong.
 #pragma once
 
-#include <arpa/inet.h>
 #include <fcntl.h>
-#include <netinet/in.h>
 #include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <memory>
@@ -15,6 +11,7 @@
 #include <string_view>
 
 #include "io/files/json.h"
+#include "tests/support/sockets.h"
 
 namespace supertac {
 
@@ -31,11 +28,8 @@ class HttpClient {
     }
     if (receive_buffer > 0)
       setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
-    sockaddr_in place{};
-    place.sin_family = AF_INET;
-    place.sin_port = htons(static_cast<std::uint16_t>(port));
-    inet_pton(AF_INET, "127.0.0.1", &place.sin_addr);
-    if (connect(socket_, reinterpret_cast<sockaddr*>(&place), sizeof place) != 0)
+    const sockaddr_in place = at_port(port);
+    if (connect(socket_, reinterpret_cast<const sockaddr*>(&place), sizeof place) != 0)
       throw std::runtime_error("cannot connect to port " + std::to_string(port));
   }
   ~HttpClient() { close(socket_); }
@@ -66,19 +60,6 @@ inline int status_of(int port, const std::string& request) {
   client.send(request);
   const std::string answer = client.receive("\r\n");
   return answer.starts_with("HTTP/1.") ? std::stoi(answer.substr(9, 3)) : 0;
-}
-
-/// A port that was free a moment ago.
-inline int free_port() {
-  const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in place{};
-  place.sin_family = AF_INET;
-  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof place;
-  if (bind(file, reinterpret_cast<sockaddr*>(&place), size) != 0) throw std::runtime_error("no port is free");
-  getsockname(file, reinterpret_cast<sockaddr*>(&place), &size);
-  close(file);
-  return ntohs(place.sin_port);
 }
 
 /// The data of the event that begins with `mark`.

@@ -1,17 +1,14 @@
 #include "hardware/boards/sensor_reader.h"
 
-#include <arpa/inet.h>
 #include <fcntl.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
 #include "hardware/virtual_rig/virtual_rig.h"
 #include "io/files/file.h"
 #include "tests/hardware/fake_sensor.h"
+#include "tests/support/sockets.h"
 #include "tests/support/test.h"
 
 namespace supertac::sensor_reader_test {
@@ -31,15 +28,6 @@ std::vector<ReadFrame> all_of(SensorReader& reader, std::size_t most = 1'000'000
   return frames;
 }
 
-// Something that listens at a port of its own; the address of it.
-sockaddr_in at_port(int port) {
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  address.sin_port = htons(static_cast<std::uint16_t>(port));
-  return address;
-}
-
 /// Sends datagrams to a port of this computer.
 class UdpSender {
  public:
@@ -55,16 +43,6 @@ class UdpSender {
   int out_ = socket(AF_INET, SOCK_DGRAM, 0);
   sockaddr_in to_;
 };
-
-int free_port(int type) {
-  const int probe = socket(AF_INET, type, 0);
-  sockaddr_in address = at_port(0);
-  socklen_t size = sizeof address;
-  EXPECT_EQ(bind(probe, reinterpret_cast<sockaddr*>(&address), size), 0);
-  EXPECT_EQ(getsockname(probe, reinterpret_cast<sockaddr*>(&address), &size), 0);
-  close(probe);
-  return ntohs(address.sin_port);
-}
 
 std::string refusal(const std::string& address) {
   return what_of<PortError>([&] { open_port(address); });
