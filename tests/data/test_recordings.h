@@ -5,6 +5,7 @@
 
 #include "data/recordings/recording.h"
 #include "data/windows/windows.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 
@@ -39,6 +40,15 @@ inline Recording make_recording(const PassPlan& plan) {
     recording.position_mm.push_back(static_cast<float>(plan.start_y_mm + plan.speed_mm_s * t));
   }
   return recording;
+}
+
+/// As the rig's authors kept a pass: a line of text a frame.
+inline std::string text_of(const Recording& recording) {
+  const std::size_t signals = recording.array.signals();
+  std::string text;
+  for (std::size_t i = 0; i < recording.signals.size(); ++i)
+    text += format(recording.signals[i]) + (i % signals == signals - 1 ? "\n" : " ");
+  return text;
 }
 
 /// The numbers of all windows of a set.

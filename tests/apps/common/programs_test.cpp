@@ -9,27 +9,12 @@
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "tests/apps/common/expect.h"
+#include "tests/data/test_recordings.h"
 #include "tests/support/test.h"
 
 namespace supertac::programs_test {
 
 constexpr std::uint64_t kPlenty = 1 << 26;
-
-/// A short text pass over nothing: frames of rest.
-std::string rest_lines(int count) {
-  std::string text;
-  for (int i = 0; i < count; ++i) {
-    for (int k = 0; k < rig::kTaxels; ++k) text += "2.4" + std::to_string((i + k) % 3) + " ";
-    text += "\n";
-  }
-  return text;
-}
-
-/// A pass in a tree of text recordings, as the rig leaves it.
-void write_pass(const std::string& path, const std::string& text) {
-  make_directories(std::filesystem::path(path).parent_path().string());
-  write_file(path, text);
-}
 
 std::string small_simulation(const std::string& out) {
   return "supertac-simulate --out " + out + " --plates ridges6 --speeds 10 --trials 1 --passes 2 ";
@@ -141,10 +126,12 @@ TEST_F(Output, JsonIsWrittenAtomicallyAndNotOverAnother) {
 }
 
 TEST_F(Import, ReportsEveryFile) {
-  write_pass(path("text/3_Bumps/1/1.txt"), rest_lines(900) + "1 2 3\n" + rest_lines(900));
+  make_directories(path("text/3_Bumps/1"));
+  const std::string nine_hundred = text_of(make_recording({.frames = 900}));
+  write_file(path("text/3_Bumps/1/1.txt"), nine_hundred + "1 2 3\n" + nine_hundred);
   const ProcessResult result = succeed("supertac-import text --out out --json j");
   EXPECT_TRUE(contains(result.out, "3_Bumps/1/1.txt  1801 lines, 1 dropped, "));
-  EXPECT_TRUE(contains(result.out, "not reliable"));  // it touches nothing
+  EXPECT_TRUE(contains(result.out, "not reliable"));  // it feels no plate
   const auto report = json("j");
   EXPECT_EQ(report["files"][0]["dropped"], 1);
   const auto recording = read_recording(path("out/3_Bumps_t1_p1_v10.safetensors"));

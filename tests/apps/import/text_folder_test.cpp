@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/data/registration/lossy_pass.h"
+#include "tests/data/test_recordings.h"
 #include "tests/support/test.h"
 
 namespace supertac::text_folder_test {
@@ -13,13 +14,6 @@ std::vector<ImportedPass> import_all(const std::string& root, const FolderImport
     std::move(plate.begin(), plate.end(), std::back_inserter(all));
   });
   return all;
-}
-
-std::string as_text(const Recording& recording) {
-  std::string text;
-  for (std::size_t i = 0; i < recording.signals.size(); ++i)
-    text += std::to_string(recording.signals[i]) + (i % rig::kTaxels == rig::kTaxels - 1 ? "\n" : " ");
-  return text;
 }
 
 std::string put(const TemporaryFolder& folder, const std::string& name, const std::string& text) {
@@ -34,7 +28,7 @@ TEST(TextFolder, EveryFrameGetsItsPlace) {
   std::vector<Recording> truth;
   for (const int pass : {2, 3, 4}) {
     truth.push_back(lossy_pass("6_Ridges", pass, 41));
-    put(folder, "6_Ridges/1/" + std::to_string(pass) + ".txt", as_text(truth.back()));
+    put(folder, "6_Ridges/1/" + std::to_string(pass) + ".txt", text_of(truth.back()));
   }
   std::vector<std::pair<std::size_t, std::size_t>> told;
   const auto imported =
@@ -66,7 +60,7 @@ TEST(TextFolder, EveryFrameGetsItsPlace) {
 
 TEST(TextFolder, APlateOfYourOwnLiesBesideItsFolder) {
   const TemporaryFolder folder;
-  put(folder, "my/3/7.txt", as_text(full_pass("plain", 1, 1)));
+  put(folder, "my/3/7.txt", text_of(full_pass("plain", 1, 1)));
   put(folder, "my/3/notes.md", "not looked at");
   put(folder, ".hidden/1/1.txt", "not looked at");
   put(folder, "my.stl", "solid nothing\nendsolid");
@@ -85,7 +79,7 @@ TEST(TextFolder, APlateOfYourOwnLiesBesideItsFolder) {
 // A published folder: remarks beside the passes, a plate in other letters, one that nobody knows.
 TEST(TextFolder, WhatIsNoPassIsNamedAndLeftOutWhenAskedTo) {
   const std::string number = "expected a number from 1 as its name: TEXT_DIR/<plate>/<trial>/<pass>.txt",
-                    text = as_text(full_pass("plain", 2, 1));
+                    text = text_of(full_pass("plain", 2, 1));
   const std::tuple<std::string, std::string, std::string> cases[] = {
       {"plain/1/1.txt", "plain/1/1.txt",
        "holds no line of numbers (too few lines); expected a row a line, separated by commas, tabs or "

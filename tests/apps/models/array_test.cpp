@@ -12,6 +12,7 @@
 #include "io/numbers/numbers.h"
 #include "models/files/model_file.h"
 #include "tests/apps/common/expect.h"
+#include "tests/data/test_recordings.h"
 #include "tests/support/test.h"
 
 namespace supertac::array_test {
@@ -29,14 +30,17 @@ class Array : public ProgramTest {
         R"("V", "pressed": "lower", "range": [2.09, 2.45], "rate_hz": 1008, "body": {"shape": "dome", "radius_mm": 47})");
     simulate("--sensor mat.json");
   }
-  void train(const std::string& data) const {
-    succeed("supertac-train --data " + data +
-            " --out m.safetensors --preset tiny --timesteps 32 --epochs 1 --stride 40 --batch 8");
+  // Of the passes in path("data"), in seconds; an option that is given again replaces the one before.
+  void train(const std::string& more = "") const {
+    succeed(
+        "supertac-train --data data --out m.safetensors --preset tiny --timesteps 32 --epochs 1 --stride 40 "
+        "--batch 8 " +
+        more);
   }
-  nlohmann::json evaluate(const std::string& data) const {
-    succeed("supertac-evaluate --data " + data +
-            " --model m.safetensors --limit 40 --json scores.json --outputs outputs.safetensors "
-            "--pictures pictures");
+  nlohmann::json evaluate() const {
+    succeed(
+        "supertac-evaluate --data data --model m.safetensors --limit 40 --json scores.json --outputs "
+        "outputs.safetensors --pictures pictures");
     return json("scores.json");
   }
   // The file of a sensor.
@@ -56,8 +60,8 @@ class Array : public ProgramTest {
 
 TEST_F(Array, SixBySixFromSimulationToScores) {
   simulate(6, 6, "2");
-  train("data");
-  const auto scores = evaluate("data");
+  train();
+  const auto scores = evaluate();
   EXPECT_EQ(scores.at("all").at("windows"), 40);
   EXPECT_TRUE(scores.at("baselines").at("ridge").at("all").at("ssim").is_number());
   EXPECT_GT(scores.at("latency").at("ridge").at("median_us"), 0);
@@ -122,18 +126,14 @@ TEST_F(Array, SignalsOfAnotherRangeAreNoticed) {
 TEST_F(Array, WindowsOf64RowsAreTrainedAndKept) {
   write_mat(64, 1, "1");
   simulate("--sensor mat.json --plates ridges6 --speeds 20 --trials 1");
-  succeed(
-      "supertac-train --data data --out m.safetensors --preset tiny --timesteps 32 --epochs 1 "
-      "--stride 64 --split none");
+  train("--stride 64 --split none");
   EXPECT_EQ(load_model(path("m.safetensors")).model->settings().groups(), 64);
 }
 
 TEST_F(Array, IsSimulatedAsASensorsFileSays) {
   write_mat(4, 6, "[4, 2.5]");
-  const std::string simulate =
-      "supertac-simulate --plates 3_Bumps --speeds 10 --trials 2 --passes 1 --sensor mat.json --out sim ";
-  succeed(simulate);
-  const Recording recording = first_of("sim");
+  simulate("--plates 3_Bumps --sensor mat.json");
+  const Recording recording = first_of("data");
   EXPECT_EQ(recording.array, (TaxelArray{.rows = 4, .columns = 6, .pitch_mm = {4, 2.5}}));
   EXPECT_EQ(recording.signal_scale, (SignalScale{.unit = "counts", .rest = 40, .span = -860}));
   EXPECT_NEAR(recording.time_s[1] - recording.time_s[0], 0.01, 1e-9);
@@ -171,10 +171,8 @@ TEST_F(Array, AHundredTablesAreImportedTrainedAndScored) {
       "--plate ridges6 --out data");
   EXPECT_TRUE(contains(imported.out, "100 recordings in"));
   EXPECT_EQ(read_recording(path("data/ridges6_t1_p1_v0.safetensors")).metadata.at("group"), "day1");
-  succeed(
-      "supertac-train --data data --out m.safetensors --preset tiny --timesteps 32 --epochs 1 "
-      "--stride 8 --batch 8 --split group");
-  EXPECT_EQ(evaluate("data").at("all").at("windows"), 40);
+  train("--stride 8 --split group");
+  EXPECT_EQ(evaluate().at("all").at("windows"), 40);
 
   const std::string one_day =
       "supertac-import log/day1 --sensor mat.json --plate ridges6 --out refused --columns time=ms:ms,";
@@ -196,10 +194,7 @@ TEST_F(Array, ATableWithoutPositionsIsRegisteredAgainstItsPlate) {
   write_mat(6, 6, R"(2.5, "body": {"shape": "dome", "radius_mm": 47})");
   succeed("supertac-simulate --plates 3_Bumps --speeds 12 --trials 1 --passes 1 --sensor mat.json --out sim");
   const Recording truth = read_recording(list_recordings(path("sim")).front());
-  std::string text;
-  for (std::size_t i = 0; i < truth.frames(); ++i)
-    for (std::size_t k = 0; k < 36; ++k) text += format(truth.signals[36 * i + k]) + (k < 35 ? " " : "\n");
-  write_file(path("slide.txt"), text);
+  write_file(path("slide.txt"), text_of(truth));
   const std::string import = "supertac-import --sensor mat.json --speed 12 ";
   EXPECT_TRUE(
       contains(succeed(import + "slide.txt --plate 3_Bumps --out data").out, "positions found, residual"));
@@ -232,12 +227,8 @@ TEST_F(Array, LivePicturesAreThoseOfEvaluation) {
   for (const std::string sensor : {"", "--sensor mat.json"})
     for (const std::string rate : {"300", "100", "60"}) {
       std::filesystem::remove_all(path("data"));
-      succeed("supertac-simulate --out data --plates bumps12 --speeds 20 --passes 1 --trials 1 --force " +
-              sensor);
-      succeed(
-          "supertac-train --data data --out m.safetensors --preset tiny --timesteps 32 --epochs 1 "
-          "--stride 90 --batch 8 --split none --force --rate " +
-          rate);
+      simulate("--speeds 20 --trials 1 --force " + sensor);
+      train("--stride 90 --split none --force --rate " + rate);
       succeed(
           "supertac-evaluate --data data --model m.safetensors --split none --outputs outputs.safetensors "
           "--force");
@@ -289,10 +280,8 @@ TEST_F(Array, CompanionsBelongToTheirOwnTable) {
     const Recording r = read_recording(file);
     const std::string day = r.metadata.at("group");
     EXPECT_EQ(r.position_mm[1], day == "day1" ? 10.0F : 20.0F);
-    Sha256 hash;
-    hash.add(bytes("log/" + day + "/1.csv"));
     const auto made = nlohmann::json::parse(SafetensorsFile::read(file).metadata().at("provenance"));
-    EXPECT_EQ(made["parents"]["table"], hash.hex());
+    EXPECT_EQ(made["parents"]["table"], sha256(bytes("log/" + day + "/1.csv")));
   }
   write_file(path("stage/day1/1.txt"), std::string("0,0,1\n1,0,1\n"));
   EXPECT_TRUE(contains(run(import + "more").error, "holds two tables of the name 1"));

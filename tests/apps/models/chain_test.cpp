@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "data/recordings/recording.h"
 #include "tests/apps/common/expect.h"
 #include "tests/support/tensor_file.h"
 #include "tests/support/test.h"
@@ -77,11 +78,8 @@ class Chain : public Training {
       const std::size_t digits = link == "picture" ? 16 : 64;
       flip_in_file(h_file, at, at + digits);
     } else if (link == "recordings") {
-      std::vector<std::string> files;
-      for (const auto& entry : fs::directory_iterator(path("data")))
-        if (entry.path().extension() == ".safetensors") files.push_back(entry.path().filename());
-      std::ranges::sort(files);
-      flip_in_file("changed/data/" + files[drawn(files.size())]);
+      const std::vector<std::string> files = list_recordings(path("changed/data"));
+      flip_in_file(fs::relative(files[drawn(files.size())], path("")));
     } else if (link == "recipe") {
       flip_in_model("", true, true);
     } else if (link == "model") {

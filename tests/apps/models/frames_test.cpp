@@ -79,8 +79,7 @@ TEST_F(Frames, SameBytesForAnyThreadsAndAfterAPause) {
 // Other groups, another factor; a stated one is kept.
 TEST_F(Frames, TheFactorOfTheIntervalsIsFoundOrStated) {
   const auto factor = [&](const std::string& name) {
-    const SafetensorsFile file = SafetensorsFile::read(path(name));
-    return file.metadata().contains("interval_factor") ? file.metadata().at("interval_factor") : "none";
+    return value_or(SafetensorsFile::read(path(name)).metadata(), "interval_factor", "none");
   };
   train("a.safetensors");
   succeed("supertac-train --data data --recipe-of a.safetensors --seed 3 --out b.safetensors");

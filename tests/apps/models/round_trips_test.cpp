@@ -6,6 +6,7 @@
 #include "hardware/collection/journal.h"
 #include "io/files/json.h"
 #include "tests/apps/common/expect.h"
+#include "tests/data/test_recordings.h"
 #include "tests/support/tensor_file.h"
 #include "tests/support/test.h"
 
@@ -43,12 +44,9 @@ class RoundTrips : public Training {
 
   // A pass as the rig's authors wrote them, imported.
   static void import_texts() {
-    const Recording pass = read_recording(path("data/3_Bumps_t1_p1_v10.safetensors"));
-    std::string text;
-    for (std::size_t i = 0; i < pass.signals.size(); ++i)
-      text += std::to_string(pass.signals[i]) + (i % 16 == 15 ? '\n' : ' ');
     fs::create_directories(path("text/3_Bumps/1"));
-    write_file(path("text/3_Bumps/1/1.txt"), text);
+    write_file(path("text/3_Bumps/1/1.txt"),
+               text_of(read_recording(path("data/3_Bumps_t1_p1_v10.safetensors"))));
     succeed("supertac-import text --out imported");
     fs::remove_all(path("text"));
   }

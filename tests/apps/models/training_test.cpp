@@ -80,11 +80,10 @@ TEST_F(Training, RandomPlatesGiveTheSameBytesAndAreNamedInTheModel) {
 // The same signals, once as the simulated finger's and once as a real one's.
 TEST_F(Training, RandomPlatesBesideARealFingerAreFeltByOtherFingers) {
   fs::create_directories(path("real"));
-  for (const auto& entry : fs::directory_iterator(path("data"))) {
-    if (entry.path().extension() != ".safetensors") continue;
-    Recording pass = read_recording(entry.path());
+  for (const std::string& file : list_recordings(path("data"))) {
+    Recording pass = read_recording(file);
     pass.source = "imported";
-    write_recording(path("real/" + entry.path().filename().string()), pass);
+    write_recording(path("real/" + recording_file_name(pass)), pass);
   }
   const auto weights = [](const std::string& name, const std::string& more) {
     trained(name + ".safetensors", "--epochs 1 --data " + more);

@@ -5,6 +5,7 @@
 #include "data/windows/windows.h"
 #include "io/files/file.h"
 #include "tests/apps/common/expect.h"
+#include "tests/data/test_recordings.h"
 #include "tests/support/test.h"
 
 namespace supertac::rig_plate_test {
@@ -40,11 +41,8 @@ TEST_F(PlateProgram, APrintedPlateIsSimulatedAndImportedLikeANamedOne) {
   EXPECT_GT(WindowSet::load(path("sim"), {}, {.timesteps = 32}).size(), 1000u);
 
   // The same pass as the rig's text, in a folder named like the plate's file.
-  std::string text;
-  for (std::size_t i = 0; i < recording.signals.size(); ++i)
-    text += std::to_string(recording.signals[i]) + (i % rig::kTaxels == rig::kTaxels - 1 ? "\n" : " ");
   make_directories(path("text/my/1"));
-  write_file(path("text/my/1/1.txt"), text);
+  write_file(path("text/my/1/1.txt"), text_of(recording));
   std::filesystem::copy(path("my.stl"), path("text/my.stl"));
   succeed("supertac-import text --out imported");
   EXPECT_EQ(read_recording(path("imported/my.stl_t1_p1_v10.safetensors")).plate, "my.stl");

@@ -128,16 +128,14 @@ TEST_F(Pipe, AReaderThatLeavesIsNoticed) {
 
 namespace fs = std::filesystem;
 
-class InFolder : public testing::Test {
+class RecorderTest : public testing::Test {
  protected:
-  InFolder() : before_(fs::current_path()) { fs::current_path(folder_.path()); }
-  ~InFolder() override { fs::current_path(before_); }
+  RecorderTest() : before_(fs::current_path()) { fs::current_path(folder_.path()); }
+  ~RecorderTest() override { fs::current_path(before_); }
 
   TemporaryFolder folder_;
   fs::path before_;
 };
-
-using RecorderTest = InFolder;
 
 const PictureFormat kFormat{.signals = 2, .image = {2, 2, 1}, .half_widths = true, .distance = true};
 

@@ -89,8 +89,7 @@ TEST_F(Streaming, StoppedForAWhileItRecordsWhatItCanDate) {
     const auto [least, most] = std::ranges::minmax(off_s);
     EXPECT_LT(most - least, 2 * PictureLog::kTrustedS) << "seed " << seed;
     const std::string left_out = std::to_string(json("json").at("left_out").get<int>());
-    EXPECT_EQ(recording.metadata.contains("left_out_frames") ? recording.metadata.at("left_out_frames") : "0",
-              left_out);
+    EXPECT_EQ(value_or(recording.metadata, "left_out_frames", "0"), left_out);
     EXPECT_EQ(ended.out.find("frames left out, their time being uncertain") == std::string::npos,
               left_out == "0")
         << ended.out;

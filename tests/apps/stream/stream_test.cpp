@@ -11,6 +11,7 @@
 #include "data/simulation/simulator.h"
 #include "data/windows/windows.h"
 #include "hardware/ports/serial_port.h"
+#include "tests/support/tensor_file.h"
 #include "tests/support/test.h"
 
 namespace supertac::stream_test {
@@ -120,8 +121,7 @@ TEST_F(Streaming, APictureThatWouldBeLateIsNotMade) {
 }
 
 TEST_F(Streaming, TakesModelsOfAnyWindowAndRefusesWhatWasFilteredOtherwise) {
-  const Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = 40});
-  write_recording(path("recording"), recording);
+  const Recording recording = record(40);
   for (const Dim timesteps : {64, 256}) {
     write_model(model(), timesteps, SimulatorSettings().filter_s);
     ASSERT_EQ(stream("--recording recording --json json --force").code, 0);
@@ -251,18 +251,10 @@ TEST_F(Streaming, AnOldCaptureStaysUntilTheNewOneIsComplete) {
 }
 
 TEST_F(Streaming, AModelThatDrawsNoNumbersIsRefused) {
-  Rng rng(1);
-  save_model(model(),
-             SuperTac({.timesteps = kTimesteps, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1}, rng),
-             {300, {}, SimulatorSettings().filter_s}, {});
-  const SafetensorsFile good = SafetensorsFile::read(model());
-  const std::vector<float> nothing(1 << 20, std::nanf(""));
-  std::vector<TensorToWrite> broken;
-  for (const auto& [name, info] : good.tensors())
-    broken.push_back(
-        {name, info.dtype, info.shape, std::as_bytes(std::span(nothing)).first(info.end - info.begin)});
-  write_safetensors(model(), good.metadata(), broken);
-  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 40}));
+  record(40);
+  TensorFile broken(SafetensorsFile::read(model()));
+  for (TensorFile::Entry& tensor : broken.tensors) std::ranges::fill(tensor.bytes, std::byte{0xFF});  // NaN
+  broken.write(model());
   expect_failure(stream("--recording recording"), 1, " holds NaN or infinity");
 }
 
