@@ -45,10 +45,29 @@ inline SuperTac random_network(const SuperTacSettings& settings = small_settings
   return SuperTac(settings, rng);
 }
 
-/// The values of the parameter of this name, to spoil them.
-inline Tensor& weights_of(const Module& module, const std::string& name) {
-  const auto found = std::ranges::find(module.parameters(), name, &Parameter::name);
-  return Variable(found->value).mutable_value();
+/// With the ranges of its values, for int8.
+inline ModelFile model_of(const SuperTacSettings& settings, const InputSettings& input) {
+  ModelFile file;
+  file.model = std::make_unique<SuperTac>(random_network(settings, 3));
+  file.input = input;
+  file.ranges.emplace().add(*file.model, uniform(file.model->input_shape(16), 5));
+  return file;
+}
+
+/// The parameter of this name.
+inline Variable parameter_of(const Module& module, const std::string& name) {
+  return std::ranges::find(module.parameters(), name, &Parameter::name)->value;
+}
+
+/// Mean and variance of all entries.
+inline std::pair<double, double> moments_of(const Tensor& t) {
+  double sum = 0, squares = 0;
+  for (const real x : t.values()) {
+    sum += static_cast<double>(x);
+    squares += static_cast<double>(x) * static_cast<double>(x);
+  }
+  const double n = static_cast<double>(t.size()), mean = sum / n;
+  return {mean, squares / n - mean * mean};
 }
 
 inline Recipe small_training() {

@@ -6,6 +6,7 @@
 #include "apps/stream/picture_maker.h"
 #include "data/sensors/rig.h"
 #include "tests/allocations.h"
+#include "tests/models/support.h"
 #include "tests/support/test.h"
 
 namespace {
@@ -41,12 +42,7 @@ long threads() {
 ModelFile model_of(const std::string& preset) {
   SuperTacSettings settings = SuperTacSettings::of_preset(preset);
   settings.predicted_error = true;
-  Rng rng(1);
-  ModelFile file;
-  file.model = std::make_unique<SuperTac>(settings, rng);
-  file.input.filter_s = rig::kFilterS;
-  file.ranges.emplace().add(*file.model, Tensor::full(file.model->input_shape(4), 0.5F));
-  return file;
+  return model_of(settings, {.scaling = {}, .filter_s = rig::kFilterS});
 }
 
 class LivePath : public testing::TestWithParam<std::tuple<const char*, Precision>> {};

@@ -73,9 +73,8 @@ TEST(Adam, NonFiniteGradientsLeaveEverythingUnchanged) {
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     const Variable a = parameter(Tensor::full({3}, 1)), b = parameter(Tensor::full({2}, 2));
     Adam adam({a, b}, {.clip_norm = 1});
-    Variable handle_a = a, handle_b = b;
-    handle_a.mutable_grad().fill(1);
-    handle_b.mutable_grad().data()[1] = static_cast<real>(bad);
+    Variable(a).mutable_grad().fill(1);
+    Variable(b).mutable_grad().data()[1] = static_cast<real>(bad);
     EXPECT_FALSE(std::isfinite(adam.step()));
     EXPECT_EQ(adam.steps(), 0);
     EXPECT_VALUES(a.value(), {3}, {1, 1, 1});

@@ -37,6 +37,12 @@ class Compiled {
   Function* function(const char* name) const {
     return reinterpret_cast<Function*>(dlsym(library_, name));
   }
+  /// Of the model of that name, which draws for it.
+  std::uint64_t self_test(const std::string& name = "finger") const {
+    std::vector<float> picture(4096), predicted_error(4096);
+    return function<std::uint64_t(float*, float*)>((name + "_self_test").c_str())(picture.data(),
+                                                                                  predicted_error.data());
+  }
 
  private:
   TemporaryFolder folder_;
@@ -51,16 +57,6 @@ bool has_compiler(const std::string& words = "cc") {
 // What the header says that self_test() returns.
 std::uint64_t self_test_of(const CCode& code) {
   return std::stoull(code.header.substr(code.header.find("SELF_TEST 0x") + 10), nullptr, 16);
-}
-using SelfTest = std::uint64_t(float*, float*);
-
-ModelFile model_of(const SuperTacSettings& settings, const InputSettings& input) {
-  ModelFile file;
-  file.model = std::make_unique<SuperTac>(random_network(settings, 3));
-  file.input = input;
-  file.ranges.emplace();
-  file.ranges->add(*file.model, uniform(file.model->input_shape(16), 5));
-  return file;
 }
 
 SuperTacSettings tiny() { return SuperTacSettings::of_preset("tiny"); }
@@ -94,9 +90,7 @@ TEST(CCode, DrawsTheBitsOfACompiledModel) {
       const Estimate expected = CompiledModel(*file.model, *file.ranges).estimate(windows);
       const auto pixels = static_cast<std::size_t>(expected.picture.size() / 5);
       std::vector<float> picture(pixels), predicted_error(pixels);
-      EXPECT_EQ(code.function<SelfTest>("finger_self_test")(picture.data(), predicted_error.data()),
-                self_test_of(exported))
-          << flags;
+      EXPECT_EQ(code.self_test(), self_test_of(exported)) << flags;
       for (std::size_t n = 0; n < 5; ++n) {
         draw(windows.data() + n * static_cast<std::size_t>(windows.size() / 5), picture.data(),
              predicted_error.data());
@@ -156,8 +150,7 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
         ASSERT_TRUE(std::ranges::equal(picture, expected.picture.values())) << "frame " << i;
       }
       EXPECT_GT(pictures, 150);
-      EXPECT_EQ(code.function<SelfTest>("finger_self_test")(picture.data(), predicted_error.data()),
-                self_test_of(exported));
+      EXPECT_EQ(code.self_test(), self_test_of(exported));
     }
 }
 
@@ -175,8 +168,8 @@ TEST(CCode, RefusesACompilerThatRearrangesSums) {
   const std::size_t error = quiet.source.find("#error");
   quiet.source.erase(error, quiet.source.find('\n', error) - error);
   const Compiled code(quiet, "cc -O2 -ffast-math");
-  std::vector<float> frame(16, 2.4F), picture(256), predicted_error(256);
-  EXPECT_EQ(code.function<SelfTest>("finger_self_test")(picture.data(), predicted_error.data()), 0U);
+  const std::vector<float> frame(16, 2.4F);
+  EXPECT_EQ(code.self_test(), 0U);
   for (int i = 0; i < 1000; ++i) ASSERT_EQ(code.function<int(const float*)>("finger_push")(frame.data()), 0);
 }
 
@@ -193,12 +186,9 @@ TEST(CCode, SeveralModelsFitIntoOneUnit) {
   for (const std::string words : {"cc -O2", "clang -O2"}) {
     if (!has_compiler(words)) continue;
     const Compiled unit(finger, words, more);
-    std::vector<float> picture(256), predicted_error(256);
     for (int turn = 0; turn < 2; ++turn) {
-      EXPECT_EQ(unit.function<SelfTest>("finger_self_test")(picture.data(), predicted_error.data()),
-                self_test_of(finger));
-      EXPECT_EQ(unit.function<SelfTest>("palm_self_test")(picture.data(), predicted_error.data()),
-                self_test_of(palm));
+      EXPECT_EQ(unit.self_test(), self_test_of(finger));
+      EXPECT_EQ(unit.self_test("palm"), self_test_of(palm));
     }
   }
 }

@@ -151,15 +151,11 @@ TEST(OpsParity, Losses) {
 }
 
 TEST(OpsParity, Ssim) {
-  const struct {
-    const char* name;
-    Shape shape;
-  } cases[] = {{"ssim", {2, 16, 13, 1}}, {"ssim8", {2, 8, 9, 1}}};
-  for (const auto& c : cases) {
-    Tensor target = numbers(std::string(c.name) + ".target", c.shape, Layout::plain);
+  const std::pair<std::string, Shape> cases[] = {{"ssim", {2, 16, 13, 1}}, {"ssim8", {2, 8, 9, 1}}};
+  for (const auto& [name, shape] : cases) {
+    Tensor target = numbers(name + ".target", shape, Layout::plain);
     for (real& x : target.values()) x = std::abs(x);
-    expect_parity(c.name, {{"x", c.shape}}, Layout::plain,
-                  [&](const auto& in) { return ssim(in[0], target); });
+    expect_parity(name, {{"x", shape}}, Layout::plain, [&](const auto& in) { return ssim(in[0], target); });
   }
 }
 

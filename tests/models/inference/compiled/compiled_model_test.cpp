@@ -216,7 +216,6 @@ void expect_refused(const std::vector<std::string>& paths, const std::string& wh
 }
 
 TEST(Ensemble, SaysWhichModelsDoNotBelongTogether) {
-  EXPECT_REFUSAL("Ensemble: members expects one network or more, got none", Ensemble({}));
   const TemporaryFolder folder;
   const auto saved = [&](const char* name, const SuperTacSettings& settings, double rate_hz = 300,
                          const std::map<std::string, std::string>& metadata = {}) {
@@ -238,14 +237,14 @@ TEST(Ensemble, SaysWhichModelsDoNotBelongTogether) {
   expect_refused({one, saved("slow.safetensors", small, 100)}, "slow.safetensors: its input are");
 }
 
-TEST(Ensemble, RefusesNetworksOfOtherInputs) {
+TEST(Ensemble, RefusesNoNetworkAndThoseOfOtherInputs) {
+  EXPECT_REFUSAL("Ensemble: members expects one network or more, got none", Ensemble({}));
   SuperTacSettings twice_as_long = small_settings();
   twice_as_long.timesteps = 64;
-  const SuperTac one = random_network(), longer = random_network(twice_as_long);
   EXPECT_REFUSAL(
       "Ensemble: members expects networks of one format, 32 frame(s) of 4x4 taxels with 1 channel(s) and "
       "pictures of 8x8, got 64 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8",
-      Ensemble({CompiledModel(one), CompiledModel(longer)}));
+      Ensemble({CompiledModel(random_network()), CompiledModel(random_network(twice_as_long))}));
 }
 
 }  // namespace supertac::compiled_model_test

@@ -19,26 +19,24 @@ struct Sample {
 
 constexpr real kNan = std::numeric_limits<real>::quiet_NaN();
 
-TEST(Diagnosis, SaysNothingOfAFiniteLoss) { EXPECT_EQ(Sample().where(), ""); }
-
-TEST(Diagnosis, NamesAnInput) {
-  Sample s;
-  s.windows.data()[16 * 5 + 9] = kNan;  // taxel 9 belongs to group 2
-  EXPECT_EQ(s.where(), "an input of conv1d in encoder.2.conv.0 is not finite");
-}
-
-TEST(Diagnosis, NamesTheTruth) {
-  Sample s;
-  s.truth.data()[70] = kNan;
-  EXPECT_EQ(s.where(), "an input of l2_loss behind upsampler.out is not finite");
-}
-
-TEST(Diagnosis, NamesAParameterAndALayer) {
-  Sample s;
-  weights_of(s.model, "upsampler.fc.weight").fill(real(3e38));
-  EXPECT_EQ(s.where(), "the output of linear in upsampler.fc is the first that is not finite");
-  weights_of(s.model, "upsampler.out.bias").fill(kNan);
-  EXPECT_EQ(s.where(), "parameter upsampler.out.bias is not finite");
+TEST(Diagnosis, NamesAnInputTheTruthALayerOrAParameter) {
+  const auto filled = [](const std::string& name, real value) {
+    return [=](Sample& s) { parameter_of(s.model, name).mutable_value().fill(value); };
+  };
+  const std::pair<std::function<void(Sample&)>, const char*> cases[] = {
+      {[](Sample&) {}, ""},
+      {[](Sample& s) { s.windows.data()[16 * 5 + 9] = kNan; },  // taxel 9 belongs to group 2
+       "an input of conv1d in encoder.2.conv.0 is not finite"},
+      {[](Sample& s) { s.truth.data()[70] = kNan; },
+       "an input of l2_loss behind upsampler.out is not finite"},
+      {filled("upsampler.fc.weight", real(3e38)),
+       "the output of linear in upsampler.fc is the first that is not finite"},
+      {filled("upsampler.out.bias", kNan), "parameter upsampler.out.bias is not finite"}};
+  for (const auto& [spoil, where] : cases) {
+    Sample s;
+    spoil(s);
+    EXPECT_EQ(s.where(), where);
+  }
 }
 
 TEST(Diagnosis, NamesTheGradientNearestToTheLoss) {
