@@ -43,7 +43,6 @@ class MemoryTest : public ::testing::Test {
  protected:
   MemoryTest() { omp_set_num_threads(1); }
   ~MemoryTest() override { omp_set_num_threads(before_); }
-  Recipe settings_ = small_training();
   int before_ = omp_get_max_threads();
 };
 
@@ -59,13 +58,10 @@ TEST_F(MemoryTest, LoadingParameters) {
 }
 
 TEST_F(MemoryTest, OneTrainingStep) {
-  const WindowSet windows = small_windows(settings_.model, 60);
-  settings_.batch = 1;  // one micro-batch
-  const auto step = [&] {
-    Trainer trainer(windows, all_of(windows), settings_);
-    trainer.train_step();
-  };
-  expect_survival(step);
+  SmallTraining small;
+  small.recipe.batch = 1;  // one micro-batch
+  small.windows = small_windows(small.recipe.model, 60);
+  expect_survival([&] { small.trainer().train_step(); });
 }
 
 TEST_F(MemoryTest, InferenceOfNewWindows) {

@@ -1,12 +1,9 @@
 // Nothing lost, nothing obeyed, nothing hung: real programs in real processes.
-#include <fcntl.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include <fstream>
 
 #include "apps/common/command_line/arguments.h"
 #include "io/files/file.h"

@@ -14,8 +14,6 @@
 
 namespace supertac::programs_test {
 
-constexpr std::uint64_t kPlenty = 1 << 26;
-
 std::string small_simulation(const std::string& out) {
   return "supertac-simulate --out " + out + " --plates ridges6 --speeds 10 --trials 1 --passes 2 ";
 }
@@ -55,10 +53,8 @@ TEST_F(Export, SaysWhatItCannotExport) {
 TEST_F(Simulate, SameSeedSameBytesForAnyThreads) {
   for (const std::string threads : {"1", "3"})
     succeed(small_simulation(threads) + "--seed 5 --threads " + threads);
-  const auto first = list_recordings(path("1"));
-  const auto second = list_recordings(path("3"));
-  for (std::size_t i = 0; i < 2; ++i)
-    EXPECT_EQ(read_file(first[i], kPlenty), read_file(second.at(i), kPlenty));
+  for (const std::string pass : {"/ridges6_t1_p1_v10.safetensors", "/ridges6_t1_p2_v10.safetensors"})
+    EXPECT_EQ(bytes("1" + pass), bytes("3" + pass));
 }
 
 TEST_F(Simulate, KeepsExistingFilesWithoutForce) {

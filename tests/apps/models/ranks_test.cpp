@@ -2,15 +2,12 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <fstream>
 #include <sstream>
-#include <thread>
 
 #include "tests/apps/common/expect.h"
-
 #include "tests/support/test.h"
 
 namespace supertac::models_ranks_test {
@@ -114,14 +111,9 @@ TEST_F(Mpi, StoppedByFourAndResumedByTwo) {
   EXPECT_TRUE(bytes("whole.safetensors") == bytes("part.safetensors"));
 }
 
-TEST_F(Mpi, NumbersThatCannotShareTheLanesAreRefused) {
-  expect_one_line(mpirun(ranks(3, options("three.safetensors"))),
-                  "3 processes cannot share the 8 micro-batches of a batch of ");
-  EXPECT_FALSE(fs::exists(path("three.run")));
-}
-
-TEST_F(Mpi, ARankWithAnotherOptionIsNamed) {
+TEST_F(Mpi, ANumberThatCannotShareTheLanesAndARankWithAnotherOptionAreNamed) {
   const auto with = [](const std::string& more) { return options("odd.safetensors", more); };
+  expect_one_line(mpirun(ranks(3, with(""))), "3 processes cannot share the 8 micro-batches of a batch of ");
   expect_one_line(mpirun(ranks(1, with("")) + " :" + ranks(1, with("--beta 0.5"))),
                   "rank 1: its training is");
   expect_one_line(mpirun(ranks(3, with("")) + " :" + ranks(1, with("--data none"))), "rank 3");

@@ -39,18 +39,12 @@ long threads() {
   return std::distance(begin(tasks), end(tasks));
 }
 
-ModelFile model_of(const std::string& preset) {
-  SuperTacSettings settings = SuperTacSettings::of_preset(preset);
-  settings.predicted_error = true;
-  return model_of(settings, {.scaling = {}, .filter_s = rig::kFilterS});
-}
-
 class LivePath : public testing::TestWithParam<std::tuple<const char*, Precision>> {};
 
 TEST_P(LivePath, APictureTakesNoHeapNoLockAndNoThread) {
   const auto [preset, precision] = GetParam();
   std::vector<ModelFile> models;
-  models.push_back(model_of(preset));
+  models.push_back(model_of(SuperTacSettings::of_preset(preset), {.scaling = {}, .filter_s = rig::kFilterS}));
   const Board board;
   PictureMaker maker(models, board, precision);
   std::vector<float> volts(static_cast<std::size_t>(board.array().signals()));
@@ -80,18 +74,6 @@ TEST_P(LivePath, APictureTakesNoHeapNoLockAndNoThread) {
 INSTANTIATE_TEST_SUITE_P(Models, LivePath,
                          testing::Combine(testing::Values("tiny", "paper"),
                                           testing::Values(Precision::fp32, Precision::int8)));
-
-// Nor does a second network.
-TEST(LivePathOfTwo, TakesNoHeapEither) {
-  std::vector<ModelFile> models;
-  for (int m = 0; m < 2; ++m) models.push_back(model_of("tiny"));
-  const Ensemble both = ensemble_of(models);
-  const Tensor window = Tensor::full(both.first().input_shape(1), 0.4F);
-  for (int warm = 0; warm < 10; ++warm) both.estimate(window);
-  const long before = allocations::made;
-  for (int n = 0; n < 50; ++n) EXPECT_TRUE(both.estimate(window).predicted_error.defined());
-  EXPECT_EQ(allocations::made, before);
-}
 
 // The counters count.
 TEST(LivePathCounters, ALockIsCounted) {

@@ -16,7 +16,6 @@
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/numbers/random.h"
-#include "io/numbers/text.h"
 #include "tests/apps/common/expect.h"
 #include "tests/hardware/fake_sensor.h"
 #include "tests/support/sockets.h"

@@ -5,7 +5,6 @@
 
 #include "apps/stream/picture_log.h"
 #include "data/recordings/recording.h"
-#include "hardware/ports/serial_port.h"
 #include "tests/apps/stream/streaming.h"
 #include "tests/hardware/fake_sensor.h"
 #include "tests/hardware/numbered_board.h"

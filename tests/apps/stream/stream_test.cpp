@@ -1,11 +1,6 @@
 // What supertac-stream draws of replays, recordings and a board, and what becomes of files and options.
 #include "tests/apps/stream/streaming.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <csignal>
-
 #include "apps/stream/stream.h"
 #include "data/recordings/recording.h"
 #include "data/simulation/simulator.h"
@@ -256,18 +251,6 @@ TEST_F(Streaming, AModelThatDrawsNoNumbersIsRefused) {
   for (TensorFile::Entry& tensor : broken.tensors) std::ranges::fill(tensor.bytes, std::byte{0xFF});  // NaN
   broken.write(model());
   expect_failure(stream("--recording recording"), 1, " holds NaN or infinity");
-}
-
-TEST_F(Streaming, ATerminalThatIsNotReadHoldsUpNobody) {
-  plug_in();
-  const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
-  ASSERT_TRUE(grantpt(terminal) == 0 && unlockpt(terminal) == 0);
-  const std::string line = "TERM=xterm timeout --foreground 120 " SUPERTAC_BIN "/supertac-stream --model " +
-                           model() + " --board " + board() + " --seconds 3 --out " + path("out") +
-                           " >/dev/null 2>" + ptsname(terminal);
-  EXPECT_EQ(std::system(line.c_str()), 0);
-  close(terminal);
-  EXPECT_GT(kept("out").f64("time_s").size(), 0U);
 }
 
 }  // namespace supertac::stream_test

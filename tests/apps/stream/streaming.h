@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "data/simulation/simulator.h"
-#include "io/files/json.h"
 #include "io/files/safetensors.h"
 #include "models/files/model_file.h"
 #include "tests/apps/common/expect.h"

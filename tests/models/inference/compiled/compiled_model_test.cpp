@@ -178,6 +178,9 @@ TEST(NoAllocation, WarmInference) {
   const Tensor one = uniform(network.input_shape(1), 1), many = uniform(network.input_shape(9), 1);
   EXPECT_EQ(allocations_of_five([&] { network.infer(one); }), 0);
   EXPECT_EQ(allocations_of_five([&] { compiled.estimate(one), compiled.estimate(many); }), 0);
+  const Ensemble both({compiled, compiled});
+  EXPECT_EQ(allocations_of_five([&] { both.estimate(one); }), 0);
+  EXPECT_TRUE(both.estimate(one).predicted_error.defined());
 }
 
 // Where members differ, the ensemble is less sure than any of them.
