@@ -5,13 +5,13 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <span>
 #include <string>
 
 #include "data/frames/binary_decoder.h"
 #include "data/sensors/sensor.h"
 #include "io/numbers/numbers.h"
+#include "tests/support/draws.h"
 
 namespace supertac {
 
@@ -28,8 +28,7 @@ inline std::uint64_t bits_of(double value, const std::string& type) {
 
 /// How many mutations a test tries: few, or SUPERTAC_MUTATIONS, for a study.
 inline int mutations(int quick) {
-  const char* wanted = std::getenv("SUPERTAC_MUTATIONS");
-  return wanted == nullptr ? quick : std::atoi(wanted);
+  return static_cast<int>(number_of("SUPERTAC_MUTATIONS", static_cast<std::uint64_t>(quick)));
 }
 
 /// One frame of so many values, in the order of the frame.

@@ -9,7 +9,6 @@
 #include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
 #include "io/numbers/numbers.h"
-#include "tests/hardware/numbered_board.h"
 
 namespace supertac {
 namespace {
@@ -183,14 +182,12 @@ DrawnRun::DrawnRun(std::uint64_t seed) {
   rig.seed = seed;
 }
 
-FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan& plan, const Point3& origin,
-                                   const PortBetween& printer) {
+FaultVerdict run_faulty_collection(const RigSettings& rig_settings, const PalpationPlan& plan,
+                                   const Point3& origin, const PortBetween& printer) {
   FaultVerdict verdict;
-  rig_settings.printer.head = origin;
-  NumberedBoard board(rig_settings);
-  CollectionBench bench(rig_settings, plan, origin);
+  NumberedCollection collected(rig_settings, plan, origin);
+  auto& [board, bench] = collected;
   SimulatedRig& rig = bench.rig;
-  board.watch(rig.world().board());
   std::vector<std::string> numbered;
   rig.world().printer().on_line([&](std::int64_t, const std::string& command, double) {
     if (command.starts_with("G1 ")) numbered.push_back(command);

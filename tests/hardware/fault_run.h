@@ -38,7 +38,7 @@ struct DrawnRun {
 /// missing; or a typed error with the finger lifted or the stop confirmed. No recording is wrong by more than
 /// kTrustedMm without saying so. `printer`: what the driver gets in the place of the printer's port.
 using PortBetween = std::function<std::unique_ptr<Port>(std::unique_ptr<Port> printer)>;
-FaultVerdict run_faulty_collection(RigSettings rig, const PalpationPlan& plan,
+FaultVerdict run_faulty_collection(const RigSettings& rig, const PalpationPlan& plan,
                                    const Point3& origin = rig::kMounted, const PortBetween& printer = {});
 
 }  // namespace supertac

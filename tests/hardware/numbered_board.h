@@ -17,7 +17,7 @@ namespace supertac {
 class NumberedBoard {
  public:
   explicit NumberedBoard(RigSettings& settings) {
-    settings.board.signals = [this](double, double, double, double) {
+    settings.signals = [this](double, double, double, double) {
       std::array<double, rig::kTaxels> volts{};
       const std::uint64_t number = heads_.size() - 1;
       for (std::size_t k = 0; k < volts.size(); k += 2) {

@@ -20,6 +20,7 @@
 #include "hardware/printers/printer.h"
 #include "io/numbers/random.h"
 #include "tests/hardware/fake_port.h"
+#include "tests/hardware/numbered_board.h"
 #include "tests/hardware/virtual_rig/rig_world.h"
 #include "tests/support/test.h"
 
@@ -164,6 +165,16 @@ struct CollectionBench {
   TemporaryFolder folder;
   SimulatedRig rig;
   RecorderSettings settings;
+};
+
+/// The same with the head at the origin, and frames that carry their number.
+struct NumberedCollection {
+  NumberedCollection(RigSettings rig_settings, const PalpationPlan& plan, const Point3& origin)
+      : numbers((rig_settings.printer.head = origin, rig_settings)), bench(rig_settings, plan, origin) {
+    numbers.watch(bench.rig.world().board());
+  }
+  NumberedBoard numbers;
+  CollectionBench bench;
 };
 
 /// The same, and the head's place is known: rig::kMounted.

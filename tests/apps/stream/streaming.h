@@ -30,7 +30,7 @@ inline void write_model(const std::string& path, Dim timesteps = kTimesteps,
 inline RigSettings touching_rig() {
   RigSettings settings;
   settings.printer_running = true;
-  settings.board.signals = [](double, double, double, double t) {
+  settings.signals = [](double, double, double, double t) {
     std::array<double, 16> volts{};
     for (std::size_t k = 0; k < volts.size(); ++k)
       volts[k] = 2.3 + 0.1 * std::sin(20 * t + static_cast<double>(k));

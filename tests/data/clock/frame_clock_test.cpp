@@ -5,8 +5,7 @@
 #include <cstdio>
 
 #include "io/numbers/median.h"
-#include "io/numbers/random.h"
-#include "tests/support/test.h"
+#include "tests/support/draws.h"
 
 namespace supertac::frame_clock_test {
 
@@ -38,41 +37,36 @@ struct SimulatedStream {
 
 /// A share of the streams each: `unlike` 0 to 1.
 StreamTraits traits_of(std::uint64_t seed) {
-  const RandomStream random(seed, 1);
-  std::uint64_t n = 0;
-  const auto draw = [&] { return random.uniform(n++); };
-  const auto one_of = [&](double share) { return draw() < share; };
+  Draws draw(seed, 1);
   StreamTraits t;
-  const bool board = one_of(0.2);
+  const bool board = draw.chance(0.2);
   t.rate_hz = board ? 1 / rig::kFramePeriodS : std::pow(10, 5 * draw());
   t.frames = 300 + std::floor(900 * draw());
   t.jitter_s = std::pow(10, -5 + 3 * draw());
-  if (one_of(0.4)) t.chunk_s = 0.001 + 0.5 * std::pow(draw(), 2);
-  if (one_of(0.3)) t.loss_rate = std::pow(10, -3 + 1.7 * draw());
-  if (one_of(0.3)) t.run_rate = 0.003;
-  if (one_of(0.3)) t.stall_rate = 0.002;
-  if (one_of(0.3)) t.capacity = 10 + std::floor(200 * draw());
+  if (draw.chance(0.4)) t.chunk_s = 0.001 + 0.5 * std::pow(draw(), 2);
+  if (draw.chance(0.3)) t.loss_rate = std::pow(10, -3 + 1.7 * draw());
+  if (draw.chance(0.3)) t.run_rate = 0.003;
+  if (draw.chance(0.3)) t.stall_rate = 0.002;
+  if (draw.chance(0.3)) t.capacity = 10 + std::floor(200 * draw());
   t.drift = 1e-4 * (draw() - 0.5);
-  if (one_of(0.2)) t.resets = 1 + static_cast<int>(2 * draw());
-  if (!board && one_of(0.4)) {
+  if (draw.chance(0.2)) t.resets = 1 + static_cast<int>(2 * draw());
+  if (!board && draw.chance(0.4)) {
     t.stated = std::pow(10, 1.4 * (draw() - 0.5));
     if (std::abs(t.stated - 1) < 0.15) t.stated = 1.5;  // what is nearly right is right
   }
   if (board) t.stated = 1 + 0.006 * (draw() - 0.5), t.tolerance = 0.005;
-  if (!board && one_of(0.5)) {
-    t.stamp_unit_s = one_of(0.6) ? 1e-3 : 1e-6;
-    t.stamp_bits = t.stamp_unit_s == 1e-3 && one_of(0.3) ? 16 : one_of(0.8) ? 32 : 64;
-    t.is_signed = one_of(0.3);
+  if (!board && draw.chance(0.5)) {
+    t.stamp_unit_s = draw.chance(0.6) ? 1e-3 : 1e-6;
+    t.stamp_bits = t.stamp_unit_s == 1e-3 && draw.chance(0.3) ? 16 : draw.chance(0.8) ? 32 : 64;
+    t.is_signed = draw.chance(0.3);
     t.clock_off = 0.006 * (draw() - 0.5);
-    if (one_of(0.4)) t.damaged_stamps = 0.004;
+    if (draw.chance(0.4)) t.damaged_stamps = 0.004;
   }
   return t;
 }
 
 SimulatedStream simulated(const StreamTraits& t, std::uint64_t seed) {
-  const RandomStream random(seed, 2);
-  std::uint64_t n = 0;
-  const auto draw = [&] { return random.uniform(n++); };
+  Draws draw(seed, 2);
   const auto delay = [&] { return -t.jitter_s * std::log(1 - draw()); };
   SimulatedStream s;
   s.traits = t;
@@ -84,7 +78,7 @@ SimulatedStream simulated(const StreamTraits& t, std::uint64_t seed) {
                     t.stamp_unit_s > 0 && t.stamp_bits < 64 ? std::exp2(t.stamp_bits) * t.stamp_unit_s : 0};
   const double range = std::exp2(t.stamp_bits);  // in units
   double time_s = 100 * draw(), device_s = t.stamp_unit_s * (t.stamp_bits < 64 ? range * draw() : 1e9);
-  if (t.stamp_bits < 64 && draw() < 0.5) device_s = t.stamp_unit_s * range - period * t.frames * draw();
+  if (t.stamp_bits < 64 && draw.chance(0.5)) device_s = t.stamp_unit_s * range - period * t.frames * draw();
   double handed_s = 0, taken_s = -1, flush_s = time_s, awake_s = 0, waiting = 0, lose = 0;
   std::uint64_t lost = 0;
   int run = 0;
@@ -211,11 +205,6 @@ Score whole_score(const SimulatedStream& s) {
   return score;
 }
 
-int streams(int quick) {
-  const char* wanted = std::getenv("SUPERTAC_STREAMS");
-  return wanted == nullptr ? quick : std::atoi(wanted);
-}
-
 // Seeds of streams that have broken their bounds once: adapters at nearly the sensor's rate, damaged stamps
 // in a row, before a loss or first of all, restarts between frames or soon after one another, few and late
 // reads.
@@ -226,10 +215,10 @@ constexpr std::uint64_t kHardSeeds[] = {2234,   7321,   13111,  13311,   16888, 
 void study(Score (*score_of)(const SimulatedStream&)) {
   std::vector<double> medians, high;
   std::uint64_t dates = 0, lost = 0, told = 0, printed = 0, outside = 0, bad = 0, false_losses = 0;
-  const char* first = std::getenv("SUPERTAC_FIRST_SEED");
-  const std::uint64_t from = first == nullptr ? 1 : std::strtoull(first, nullptr, 10);
+  const std::uint64_t from = number_of("SUPERTAC_FIRST_SEED", 1),
+                      streams = number_of("SUPERTAC_STREAMS", 400);
   std::vector<std::uint64_t> seeds(std::begin(kHardSeeds), std::end(kHardSeeds));
-  for (int k = 0; k < streams(400); ++k) seeds.push_back(from + static_cast<std::uint64_t>(k));
+  for (std::uint64_t k = 0; k < streams; ++k) seeds.push_back(from + k);
   for (const std::uint64_t seed : seeds) {
     const SimulatedStream s = simulated(traits_of(seed), seed);
     if (s.arrivals.size() < 20) continue;
@@ -332,11 +321,10 @@ TEST(FrameTimeline, SaysWhenABoardIsNoneOfTheRigs) {
 // Frames that a loaded host reads late, all of them in one read after the other, have all arrived.
 TEST(FrameClock, ALoadedHostLosesNothingThatArrived) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const RandomStream random(seed, 9);
+    Draws draw(seed, 9);
     FrameClock clock(ClockSettings{});
     std::vector<FrameDate> dates;
     double awake_s = 0;
-    std::uint64_t n = 0;
     for (std::uint64_t i = 0; i < 30'000;) {
       // It runs for some milliseconds, and waits for its turn for up to half a second.
       std::vector<FrameArrival> read;
@@ -344,7 +332,7 @@ TEST(FrameClock, ALoadedHostLosesNothingThatArrived) {
       while (i < 30'000 && rig::kFramePeriodS * static_cast<double>(i) <= now_s)
         read.push_back({.time_s = now_s}), ++i;
       clock.date(read, dates);
-      if (random.uniform(n++) < 0.2) awake_s = now_s + 0.5 * std::pow(random.uniform(n++), 4);
+      if (draw.chance(0.2)) awake_s = now_s + 0.5 * std::pow(draw(), 4);
     }
     clock.finish();
     EXPECT_EQ(clock.missing(), 0U) << "seed " << seed;

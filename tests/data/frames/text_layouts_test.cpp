@@ -3,8 +3,7 @@
 #include "data/frames/probe.h"
 #include "data/frames/sensor_decoder.h"
 #include "io/numbers/numbers.h"
-#include "io/numbers/random.h"
-#include "tests/support/test.h"
+#include "tests/support/draws.h"
 
 namespace supertac::text_layouts_test {
 
@@ -17,20 +16,6 @@ struct TextLayout {
   bool clock = false;                     // the lines say it
 };
 
-class Draws {
- public:
-  explicit Draws(std::uint64_t seed) : random_(seed, 57) {}
-  std::size_t below(std::size_t n) {
-    return static_cast<std::size_t>(random_.uniform(at_++) * static_cast<double>(n));
-  }
-  bool often(double share) { return random_.uniform(at_++) < share; }
-  double normal() { return random_.normal(at_++); }
-
- private:
-  RandomStream random_;
-  std::uint64_t at_ = 0;
-};
-
 std::string clock_of_day(double s) {
   const auto two = [](int n) { return (n < 10 ? "0" : "") + std::to_string(n); };
   const int whole = static_cast<int>(s), ms = static_cast<int>(std::lround((s - whole) * 1000)) % 1000;
@@ -39,26 +24,26 @@ std::string clock_of_day(double s) {
 }
 
 TextLayout text_layout_of(std::uint64_t seed) {
-  Draws draw(seed);
+  Draws draw(seed, 57);
   constexpr std::pair<std::size_t, std::size_t> kArrays[] = {{4, 4},  {3, 3}, {8, 8},  {4, 6},
                                                              {6, 10}, {2, 5}, {16, 16}};
   const auto [rows, columns] = kArrays[draw.below(std::size(kArrays))];
   const std::size_t values = rows * columns;
   constexpr const char* kBetween[] = {",", ";", "\t", " ", ", ", " | ", "; "};
   const std::string between = kBetween[draw.below(std::size(kBetween))];
-  const int decimals = draw.often(0.4) ? 1 + static_cast<int>(draw.below(3)) : 0;
-  const bool comma = decimals > 0 && between[0] != ',' && draw.often(0.5);
+  const int decimals = draw.chance(0.4) ? 1 + static_cast<int>(draw.below(3)) : 0;
+  const bool comma = decimals > 0 && between[0] != ',' && draw.chance(0.5);
   constexpr std::pair<const char*, const char*> kAround[] = {{"", ""},        {"(", ")"}, {"[", " ]"},
                                                              {"/*", "*/"},    {"<", ">"}, {"data: ", ""},
                                                              {"[INFO] ", ""}, {"", ";"},  {"$TAX,", ""}};
   auto [open, close] = kAround[draw.below(std::size(kAround))];
   const std::size_t stamp = draw.below(6);  // none, none, ms, us, s, monitor
-  const bool counter = draw.often(0.3), sum = decimals == 0 && draw.often(0.2), star = draw.often(0.15);
+  const bool counter = draw.chance(0.3), sum = decimals == 0 && draw.chance(0.2), star = draw.chance(0.15);
   const std::size_t form = draw.below(10);  // 0, 1: several lines; 2: labels; 3: row: values
   const bool several = form < 2, labelled = form == 2, by_rows = form == 3;
-  const bool dead = draw.often(0.3), none = draw.often(0.15), boot = draw.often(0.3), wide = draw.often(0.1),
-             remarks = draw.often(0.2);
-  const double base = draw.often(0.3) ? -200 : 300, apart = draw.often(0.5) ? 3 : 40;
+  const bool dead = draw.chance(0.3), none = draw.chance(0.15), boot = draw.chance(0.3),
+             wide = draw.chance(0.1), remarks = draw.chance(0.2);
+  const double base = draw.chance(0.3) ? -200 : 300, apart = draw.chance(0.5) ? 3 : 40;
   TextLayout layout;
   layout.values = values;
   layout.what = "seed " + std::to_string(seed) + ", " + std::to_string(rows) + "x" + std::to_string(columns) +
@@ -117,7 +102,7 @@ TextLayout text_layout_of(std::uint64_t seed) {
     }
     if (stamp == 5 && !several && !by_rows) text = clock_of_day(84000.5 + 0.02 * n) + " -> " + text;
     text += "\r\n";
-    if (draw.often(0.02))
+    if (draw.chance(0.02))
       text.erase(text.size() / 2, text.size() / 5);  // damaged
     else
       layout.sent.push_back(now), layout.time_s.push_back(t);
@@ -135,12 +120,12 @@ TextLayout text_layout_of(std::uint64_t seed) {
 
 /// Objects of JSON, scientific notation, a header and two arrays in a line.
 TextLayout second_layout_of(std::uint64_t seed) {
-  Draws draw(seed);
+  Draws draw(seed, 57);
   constexpr std::pair<std::size_t, std::size_t> kArrays[] = {{4, 4}, {5, 5}, {8, 8}, {4, 6}};
   const auto [rows, columns] = kArrays[draw.below(std::size(kArrays))];
   const std::size_t values = rows * columns, form = draw.below(4);
   const std::size_t stamp = draw.below(4);  // none, ms, us, s
-  const bool nested = draw.often(0.5), counter = draw.often(0.5), pose = draw.often(0.5);
+  const bool nested = draw.chance(0.5), counter = draw.chance(0.5), pose = draw.chance(0.5);
   const double base = 300 + 100 * draw.normal();
   constexpr const char* kForms[] = {"JSON", "scientific", "header", "two arrays"};
   TextLayout layout;
@@ -201,16 +186,16 @@ TextLayout second_layout_of(std::uint64_t seed) {
 /// And firmware's habits: glued units, a line for each taxel with its row and column, hexadecimal without 0x,
 /// a baseline that drifts beside the signals.
 TextLayout third_layout_of(std::uint64_t seed) {
-  Draws draw(seed + 4000);
+  Draws draw(seed + 4000, 57);
   const std::size_t form = seed % 16, rows = 2 + draw.below(3), columns = 3 + draw.below(3);
   const std::size_t cells = rows * columns, values = form == 1 ? 3 * cells : cells;
   constexpr const char* kWhat[] = {"names",       "channels",         "two hands",        "decimal commas",
                                    "thousands",   "hexadecimal",      "numbered",         "a taxel a line",
                                    "units",       "brackets",         "labelled movie",   "Fortran",
                                    "glued units", "row,column,value", "bare hexadecimal", "drift"};
-  const bool firmware = form >= 12, stamped = form == 12 && draw.often(0.5);
-  const std::string between = form == 3 || form == 4 ? ";" : draw.often(0.5) ? (firmware ? " " : ",") : "\t";
-  const std::string unit = draw.often(0.5) ? "g" : "mV";
+  const bool firmware = form >= 12, stamped = form == 12 && draw.chance(0.5);
+  const std::string between = form == 3 || form == 4 ? ";" : draw.chance(0.5) ? (firmware ? " " : ",") : "\t";
+  const std::string unit = draw.chance(0.5) ? "g" : "mV";
   TextLayout layout;
   layout.what = "third family, seed " + std::to_string(seed) + ", " + kWhat[form];
   layout.values = form == 15 ? 2 * values : values;
@@ -325,8 +310,7 @@ bool reads(const TextLayout& layout, const Sensor& draft) {
 void expect_right_or_refused(TextLayout (*layout_of_seed)(std::uint64_t), int count, double share,
                              std::uint64_t first = 1) {
   int right = 0, refused = 0, silent = 0;
-  const char* wanted = std::getenv("SUPERTAC_FIRST_SEED");
-  const std::uint64_t from = wanted == nullptr ? first : std::strtoull(wanted, nullptr, 10);
+  const std::uint64_t from = number_of("SUPERTAC_FIRST_SEED", first);
   for (std::uint64_t seed = from; seed < from + static_cast<std::uint64_t>(count); ++seed) {
     const TextLayout layout = layout_of_seed(seed);
     const ProbeReport report = probe(layout.heard, "here", {});

@@ -1,7 +1,6 @@
 #include "data/sensors/taxel_array.h"
 
-#include "io/numbers/random.h"
-#include "tests/support/test.h"
+#include "tests/support/draws.h"
 
 namespace supertac::layout_test {
 
@@ -33,23 +32,21 @@ struct Pressing {
   }
   // A finger comes down somewhere, moves a little and leaves; one taxel in 20 is dead, and all drift.
   std::vector<std::vector<float>> signals() const {
-    const RandomStream random(seed, 3);
-    std::uint64_t next = 0;
+    Draws draw(seed, 3);
     std::vector<std::vector<float>> sent(static_cast<std::size_t>(rows * columns));
     double y = 0, x = 0, force = 0;
     for (int n = 0; n < seconds * 50; ++n) {
       const double phase = n % 40 / 40.0;
-      if (n % 40 == 0)
-        y = random.uniform(next++) * rows - 0.5, x = random.uniform(next++) * columns - 0.5,
-        force = 0.3 + random.uniform(next++);
-      x += 0.05 * random.normal(next++), y += 0.05 * random.normal(next++);
+      if (n % 40 == 0) y = draw() * rows - 0.5, x = draw() * columns - 0.5, force = 0.3 + draw();
+      x += 0.05 * draw.normal(), y += 0.05 * draw.normal();
       for (int row = 0; row < rows; ++row)
         for (int column = 0; column < columns; ++column) {
           const double far = (std::pow(row - y, 2) + std::pow(column - x, 2)) / (2 * reach * reach);
-          const bool dead = random.uniform(1'000'000 + static_cast<std::uint64_t>(place(row, column))) < 0.05;
+          const bool dead =
+              draw.random.uniform(1'000'000 + static_cast<std::uint64_t>(place(row, column))) < 0.05;
           const double press = phase < 0.6 ? force * std::exp(-far) : 0;
-          sent[static_cast<std::size_t>(place(row, column))].push_back(static_cast<float>(
-              dead ? 0 : press + noise * random.normal(next++) + 0.1 * std::sin(n / 300.0)));
+          sent[static_cast<std::size_t>(place(row, column))].push_back(
+              static_cast<float>(dead ? 0 : press + noise * draw.normal() + 0.1 * std::sin(n / 300.0)));
         }
     }
     return sent;

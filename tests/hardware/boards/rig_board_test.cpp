@@ -28,7 +28,7 @@ std::uint64_t taken_until_unplugged(
 
 TEST(RigBoard, DeliversEveryFrameInOrderUntilItIsUnplugged) {
   RigSettings settings = running_rig();
-  settings.board.signals = [](double, double, double, double t) {
+  settings.signals = [](double, double, double, double t) {
     std::array<double, 16> volts{};
     volts.fill(2.0 + 0.1 * (t - 1000));
     return volts;

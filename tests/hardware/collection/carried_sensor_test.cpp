@@ -6,7 +6,6 @@
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "tests/hardware/fake_sensor.h"
-#include "tests/hardware/numbered_board.h"
 #include "tests/hardware/rig_support.h"
 #include "tests/support/test.h"
 
@@ -82,24 +81,22 @@ Bed far_bed() {
   return bed;
 }
 
-struct CarriedSensor {
-  explicit CarriedSensor(const Sensor& sensor, RigSettings rig_settings = running_rig())
-      : numbers((rig_settings.printer.head = far_bed().origin, rig_settings)), rig(rig_settings) {
-    numbers.watch(rig.world().board());
-    settings.bed = far_bed();
-    settings.sensor = sensor;
-    settings.journal = folder / "journal";
-    settings.header = header_of(sensor, settings.bed);
+struct CarriedSensor : NumberedCollection {
+  explicit CarriedSensor(const Sensor& sensor, const RigSettings& rig = running_rig())
+      : NumberedCollection(rig, far_bed().plan, far_bed().origin) {
+    bench.settings.bed = far_bed();
+    bench.settings.sensor = sensor;
+    bench.settings.header = header_of(sensor, far_bed());
   }
   RecorderReport record() {
-    return record_palpation(std::make_unique<TextPort>(rig.board_port(), numbers, settings.sensor),
-                            rig.printer_port(), settings);
+    return record_palpation(
+        std::make_unique<TextPort>(bench.rig.board_port(), numbers, bench.settings.sensor),
+        bench.rig.printer_port(), bench.settings);
   }
-  Journal journal() const { return read_journal(settings.journal); }
   /// Of a run that has to be complete: its first pass.
   CollectedPass first_pass() {
     EXPECT_TRUE(record().outcome.complete);
-    return collection_of(journal()).passes.at(0);
+    return collection_of(bench.journal()).passes.at(0);
   }
   /// How far (mm) the frames' positions are from where the head was in their middle, at most.
   double worst(const CollectedPass& pass) const {
@@ -113,18 +110,13 @@ struct CarriedSensor {
     }
     return worst;
   }
-
-  TemporaryFolder folder;
-  NumberedBoard numbers;
-  SimulatedRig rig;
-  RecorderSettings settings;
 };
 
 TEST(CarriedSensor, EveryFrameHasItsPositionWithAndWithoutTimeStamps) {
   for (const bool stamped : {true, false}) {
     CarriedSensor run(mat(stamped));
     const CollectedPass pass = run.first_pass();
-    const Collection collection = collection_of(run.journal());
+    const Collection collection = collection_of(run.bench.journal());
     EXPECT_EQ(collection.sensor, mat(stamped));
     EXPECT_EQ(collection.bed, far_bed());
     EXPECT_EQ(collection.passes.size(), 1U);
@@ -158,7 +150,7 @@ TEST(CarriedSensor, AHostThatStandsStillMakesNothingWrongInSilence) {
       rig.seed = seed;
       CarriedSensor run(mat(stamped), rig);
       (void)run.record();
-      for (const CollectedPass& pass : collection_of(run.journal()).passes) {
+      for (const CollectedPass& pass : collection_of(run.bench.journal()).passes) {
         if (!pass.doubt.empty() || !pass.complete) continue;
         frames += pass.time_s.size();
         EXPECT_LE(run.worst(pass), kTrustedMm) << "seed " << seed << ", stamped " << stamped;
@@ -171,7 +163,7 @@ TEST(CarriedSensor, AHostThatStandsStillMakesNothingWrongInSilence) {
 TEST(CarriedSensor, ADamagedJournalCostsItsOwnFramesOnly) {
   CarriedSensor run(mat(true));
   (void)run.record();
-  std::string bytes = read_text_file(run.settings.journal, 1 << 30);
+  std::string bytes = read_text_file(run.bench.settings.journal, 1 << 30);
   const char of_the_sensor[] = {'S', 'T', 'J', '1', 2, 0, 0, 0};
   std::vector<std::size_t> chunks;
   for (std::size_t at = 0; (at = bytes.find({of_the_sensor, 8}, at)) != std::string::npos; ++at)

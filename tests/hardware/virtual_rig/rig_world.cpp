@@ -9,31 +9,16 @@ namespace {
 constexpr int kStallFrames = 20;
 constexpr int kHeldFrames = 25;  // in the tty of a host that does not read
 
-/// Settings of the printer or the board, with the rig's faults and seed.
-template <class Part>
-Part part_of(const RigSettings& settings, Part part) {
-  part.faults = settings.faults;
-  part.seed = settings.seed;
-  return part;
-}
-
 }  // namespace
 
-VirtualBoard::VirtualBoard(const VirtualBoardSettings& settings, double t)
-    : settings_(settings), start_(t), dice_(settings.seed, 202) {}
-
-BoardFrame VirtualBoard::sample(const Point3& head, double t) {
-  TaxelVolts volts{};
-  volts.fill(rig::kRestVolts);
-  if (settings_.signals) volts = settings_.signals(head.x, head.y, head.z, t);
-  return frame_of(volts);
-}
+VirtualBoard::VirtualBoard(FingerSignals signals, const RigFaults& faults, std::uint64_t seed, double t)
+    : signals_(std::move(signals)), faults_(faults), start_(t), dice_(seed, 202) {}
 
 std::vector<std::byte> VirtualBoard::make_frame(const Point3& head) {
   const double middle = next_frame() - 0.5 * rig::kFramePeriodS;
   ++counters_.made;
-  if (stalled_frames_ == 0 && dice_.hit(settings_.faults.stall_rate)) stalled_frames_ = kStallFrames;
-  if (stalled_frames_ == 0 && dice_.hit(settings_.faults.freeze_rate)) {
+  if (stalled_frames_ == 0 && dice_.hit(faults_.stall_rate)) stalled_frames_ = kStallFrames;
+  if (stalled_frames_ == 0 && dice_.hit(faults_.freeze_rate)) {
     room_ = kHeldFrames - static_cast<int>(held_.size() / rig::kFrameBytes);
     stalled_frames_ = static_cast<int>((0.3 + 1.7 * dice_.uniform()) / rig::kFramePeriodS);
   }
@@ -41,13 +26,16 @@ std::vector<std::byte> VirtualBoard::make_frame(const Point3& head) {
   const bool held = stalled && room_ > 0;
   if (held) --room_;
   if (stalled && --stalled_frames_ == 0) tear_next_ = true;
-  const bool lost = (stalled && !held) || dice_.hit(settings_.faults.lost_frame_rate);
+  const bool lost = (stalled && !held) || dice_.hit(faults_.lost_frame_rate);
   if (truth_) truth_(head);
   if (lost) {
     ++counters_.lost;
     return {};
   }
-  const BoardFrame fresh = sample(head, middle);
+  TaxelVolts volts{};
+  volts.fill(rig::kRestVolts);
+  if (signals_) volts = signals_(head.x, head.y, head.z, middle);
+  const BoardFrame fresh = frame_of(volts);
   BoardFrame frame = fresh;
   if (tear_next_) {  // half old, half new, behind a valid header and trailer
     std::copy_n(previous_.samples.begin(), rig::kFrameSamples / 2, frame.samples.begin());
@@ -71,8 +59,8 @@ void VirtualBoard::refuse_last() {
 
 RigWorld::RigWorld(const RigSettings& settings, double t)
     : now_(t),
-      printer_(part_of(settings, settings.printer), t, settings.printer_running),
-      board_(part_of(settings, settings.board), t),
+      printer_(settings.printer, t, settings.printer_running, settings.faults, settings.seed),
+      board_(settings.signals, settings.faults, settings.seed, t),
       chunk_s_(settings.chunk_s),
       chunk_due_(t),
       memory_(settings.memory),

@@ -11,12 +11,6 @@
 
 namespace supertac {
 
-struct VirtualBoardSettings {
-  FingerSignals signals{};  ///< empty: all taxels at rest
-  RigFaults faults{};       ///< lost frames and stalls; bytes are the port's matter
-  std::uint64_t seed = 1;
-};
-
 /// A tactile board: true byte format and rate, frames that vanish when USB is busy, and after a stall a torn
 /// one.
 class VirtualBoard {
@@ -26,7 +20,8 @@ class VirtualBoard {
     std::uint64_t made = 0, sent = 0, lost = 0, torn = 0;
   };
 
-  VirtualBoard(const VirtualBoardSettings& settings, double t);
+  /// Of the faults lost frames and stalls; bytes are the port's matter.
+  VirtualBoard(FingerSignals signals, const RigFaults& faults, std::uint64_t seed, double t);
 
   /// End of the frame now being sampled.
   double next_frame() const { return start_ + static_cast<double>(counters_.made + 1) * rig::kFramePeriodS; }
@@ -41,9 +36,8 @@ class VirtualBoard {
   const Counters& counters() const { return counters_; }
 
  private:
-  BoardFrame sample(const Point3& head, double t);
-
-  VirtualBoardSettings settings_;
+  FingerSignals signals_;
+  RigFaults faults_;
   double start_;
   Dice dice_;
   Counters counters_;
@@ -56,12 +50,12 @@ class VirtualBoard {
 
 struct RigSettings {
   VirtualPrinterSettings printer{};
-  VirtualBoardSettings board{};
+  FingerSignals signals{};       ///< of the board; empty: all taxels at rest
   bool printer_running = false;  ///< booted long ago
-  RigFaults faults{};            ///< replaces those of printer and board
+  RigFaults faults{};
   double chunk_s = 0;      ///< longest wait of an adapter that hands the board's bytes on in chunks; 0: none
   std::size_t memory = 0;  ///< bytes that this adapter keeps of what the host does not take
-  std::uint64_t seed = 1;  ///< replaces those of printer and board
+  std::uint64_t seed = 1;
 };
 
 class RigWorld : public RigAtPorts {

@@ -50,12 +50,14 @@ void FaultyMotion::hold(double t, double seconds) {
   running = {rest_, running.to, t + seconds, running.end};
 }
 
-VirtualPrinter::VirtualPrinter(const VirtualPrinterSettings& settings, double t, bool already_running)
+VirtualPrinter::VirtualPrinter(const VirtualPrinterSettings& settings, double t, bool already_running,
+                               const RigFaults& faults, std::uint64_t seed)
     : settings_(settings),
+      faults_(faults),
       motion_(settings.head,
               settings.start_delay_s > 0 ? settings.start_delay_s : (klipper() ? 0.253 : 0.107),
               settings.slowness, settings.acceleration),
-      dice_(settings.seed, 101),
+      dice_(seed, 101),
       now_(t),
       boot_end_(t) {
   lines_.ignores_repetitions = settings.firmware == Firmware::marlin;
@@ -251,31 +253,30 @@ void VirtualPrinter::start_next(double t) {
 }
 
 bool VirtualPrinter::random_trouble(double t) {
-  const RigFaults& faults = settings_.faults;
-  if (dice_.hit(faults.reset_rate)) {
+  if (dice_.hit(faults_.reset_rate)) {
     reset(t);
     return true;
   }
-  if (dice_.hit(faults.action_rate)) {
+  if (dice_.hit(faults_.action_rate)) {
     constexpr const char* kSaid[] = {"//action:cancel\n", "// action:cancel\n", "//action:pause\n",
                                      "//action:paused\n"};
     output_ += kSaid[dice_.below(4)];
   }
-  if (dice_.hit(faults.pause_rate)) {
+  if (dice_.hit(faults_.pause_rate)) {
     pause_behind_move(t);
     return true;
   }
-  if (dice_.hit(faults.stall_rate)) {
+  if (dice_.hit(faults_.stall_rate)) {
     command_due_ = t + 0.05;
     return true;
   }
-  if (dice_.hit(faults.freeze_rate)) {
+  if (dice_.hit(faults_.freeze_rate)) {
     const double seconds = 0.3 + 1.7 * dice_.uniform();
     command_due_ = t + seconds;
     motion_.hold(t, seconds);
     return true;
   }
-  if (dice_.hit(faults.resend_storm_rate)) {
+  if (dice_.hit(faults_.resend_storm_rate)) {
     for (int i = 0; i < 3; ++i) complain(lines_.complaint("checksum mismatch"));
   }
   return false;
@@ -297,7 +298,7 @@ void VirtualPrinter::finish_block(double t) {
 
 void VirtualPrinter::reply_ok() {
   const std::string text = std::exchange(ok_text_, {});
-  if (dice_.hit(settings_.faults.lost_ok_rate)) return;
+  if (dice_.hit(faults_.lost_ok_rate)) return;
   output_ += "ok" + text + "\n";
 }
 

@@ -52,8 +52,6 @@ struct VirtualPrinterSettings {
   bool heartbeat = false;      ///< `wait` every second when idle
   double boot_s = 0.4;         ///< power-on to `start`
   std::string boot_garbage{};  ///< bytes sent before the banner
-  RigFaults faults{};          ///< lost ok, storms, resets, stalls; bytes are the port's matter
-  std::uint64_t seed = 1;
 };
 
 /// A planner with room for so many moves, which may stand still.
@@ -69,8 +67,10 @@ class FaultyMotion : public MotionQueue {
 
 class VirtualPrinter {
  public:
-  /// Switched on at time t. `already_running`: booted long ago, no banner, line number 357.
-  VirtualPrinter(const VirtualPrinterSettings& settings, double t, bool already_running = false);
+  /// Switched on at time t. `already_running`: booted long ago, no banner, line number 357. Of the faults
+  /// lost ok, storms, resets and stalls; bytes are the port's matter.
+  VirtualPrinter(const VirtualPrinterSettings& settings, double t, bool already_running = false,
+                 const RigFaults& faults = {}, std::uint64_t seed = 1);
 
   /// Bytes from the host, arriving at time t (not before the last advance).
   void receive(std::string_view bytes, double t);
@@ -139,6 +139,7 @@ class VirtualPrinter {
   bool random_trouble(double t);
 
   VirtualPrinterSettings settings_;
+  RigFaults faults_;
   FaultyMotion motion_;
   Dice dice_;
   Point3 offset_, base_;  // logical = physical - offset - base; base_: Klipper's own
