@@ -65,7 +65,6 @@ class SimulatedRig {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Chunk> board_chunks_;
-  std::vector<std::byte> printer_bytes_;
   Dice latency_, freezes_;
   double freeze_rate_, frozen_until_ = 0;
   std::size_t room_ = 0;  // in the kernel's buffers while the host stands still

@@ -15,10 +15,9 @@ constexpr double kUsbLatency = 0.0002;
 
 }  // namespace
 
-class SimulatedRig::PrinterPort : public Port {
+class SimulatedRig::PrinterPort : public FakePort {
  public:
-  explicit PrinterPort(SimulatedRig& rig) : rig_(rig) {}
-  const std::string& name() const override { return name_; }
+  explicit PrinterPort(SimulatedRig& rig) : rig_(rig) { name_ = "simulated printer"; }
   double now() override { return rig_.now(); }
 
   Received read(std::span<std::byte> buffer, double until) override {
@@ -26,20 +25,16 @@ class SimulatedRig::PrinterPort : public Port {
     rig_.maybe_freeze(lock);
     for (;;) {
       check();
-      const std::vector<std::byte> fresh = rig_.world_.from_printer();
-      rig_.printer_bytes_.insert(rig_.printer_bytes_.end(), fresh.begin(), fresh.end());
-      if (!rig_.printer_bytes_.empty()) break;
+      said_ += as_text(rig_.world_.from_printer());
+      if (!said_.empty()) break;
       if (rig_.world_.now() >= until) return {0, rig_.world_.now()};
       // A step at a time, so that an answer is seen when it is given.
       const double event = rig_.world_.printer().next_event();
       rig_.advance(lock, std::min(until, std::max(event, rig_.world_.now())));
     }
-    const std::size_t count = std::min(buffer.size(), rig_.printer_bytes_.size());
-    std::copy_n(rig_.printer_bytes_.begin(), count, buffer.begin());
-    rig_.printer_bytes_.erase(rig_.printer_bytes_.begin(),
-                              rig_.printer_bytes_.begin() + static_cast<std::ptrdiff_t>(count));
     rig_.maybe_freeze(lock);
-    return {count, rig_.world_.now()};
+    now_ = rig_.world_.now();
+    return hand_on(buffer);
   }
 
   double write(std::span<const std::byte> bytes, double) override {
@@ -58,7 +53,6 @@ class SimulatedRig::PrinterPort : public Port {
       throw PortUnplugged("port simulated printer: the device is gone; check the cable and start again");
   }
   SimulatedRig& rig_;
-  std::string name_ = "simulated printer";
 };
 
 class SimulatedRig::BoardPort : public Port {

@@ -3,6 +3,7 @@
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
+#include "io/numbers/text.h"
 #include "tests/hardware/fake_sensor.h"
 #include "tests/support/test.h"
 
@@ -29,11 +30,7 @@ std::vector<Heard> sent(const Sensor& sensor, double seconds, bool pressed = tru
   return heard;
 }
 
-std::string all(const ProbeReport& report) {
-  std::string text;
-  for (const std::string& line : report.says) text += line + "\n";
-  return text;
-}
+std::string all(const ProbeReport& report) { return joined(report.says, "\n"); }
 
 void expect_said(const ProbeReport& report, const std::string& words) {
   EXPECT_NE(all(report).find(words), std::string::npos) << all(report);

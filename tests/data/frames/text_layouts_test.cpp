@@ -3,6 +3,7 @@
 #include "data/frames/probe.h"
 #include "data/frames/sensor_decoder.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 #include "tests/support/draws.h"
 
 namespace supertac::text_layouts_test {
@@ -314,8 +315,7 @@ void expect_right_or_refused(TextLayout (*layout_of_seed)(std::uint64_t), int co
   for (std::uint64_t seed = from; seed < from + static_cast<std::uint64_t>(count); ++seed) {
     const TextLayout layout = layout_of_seed(seed);
     const ProbeReport report = probe(layout.heard, "here", {});
-    std::string said;
-    for (const std::string& line : report.says) said += line + "\n";
+    const std::string said = joined(report.says, "\n");
     if (!report.draft) {
       ++refused;
       EXPECT_GT(report.says.back().size(), 20U);

@@ -6,12 +6,6 @@
 
 namespace supertac::truth_test {
 
-std::vector<float> image_at(const Plate& plate, double x, double y, int size) {
-  std::vector<float> image(static_cast<std::size_t>(size * size));
-  truth_image(plate, x, y, {size, size, 12.0 / size}, image);
-  return image;
-}
-
 // One hemisphere, centred on (18, 54): with the finger 3 mm left and 4 mm short of it, the scene is symmetric
 // in neither direction, so a swapped or mirrored axis shows.
 const Plate& one_blob() {
@@ -20,15 +14,12 @@ const Plate& one_blob() {
 }
 
 TEST(Truth, RowsGrowWithYAndColumnsWithX) {
-  const auto image = image_at(one_blob(), 15, 50, 12);  // pixels of 1 mm, first centre at (9.5, 44.5)
-  for (int r = 0; r < 12; ++r)
-    for (int c = 0; c < 12; ++c)
-      EXPECT_FLOAT_EQ(image[static_cast<std::size_t>(12 * r + c)],
-                      static_cast<float>(one_blob().height(9.5 + c, 44.5 + r) / 1.5));
-  EXPECT_GT(image[12 * 9 + 8], 0.8F);   // row of y = 53.5, column of x = 17.5
-  EXPECT_EQ(image[12 * 8 + 11], 0.0F);  // its transpose side
-  EXPECT_EQ(image[12 * 2 + 8], 0.0F);   // mirrored in y
-  EXPECT_EQ(image[12 * 9 + 3], 0.0F);   // mirrored in x
+  std::vector<float> image(144);
+  truth_image(one_blob(), 15, 50, {12, 12, 1}, image);  // first centre at (9.5, 44.5)
+  EXPECT_GT(image[12 * 9 + 8], 0.8F);                   // row of y = 53.5, column of x = 17.5
+  EXPECT_EQ(image[12 * 8 + 11], 0.0F);                  // its transpose side
+  EXPECT_EQ(image[12 * 2 + 8], 0.0F);                   // mirrored in y
+  EXPECT_EQ(image[12 * 9 + 3], 0.0F);                   // mirrored in x
 }
 
 TEST(Truth, IsZeroOnTheFlatPlateAndOneOnTopOfEveryPlate) {
@@ -61,16 +52,18 @@ TEST(Truth, TellsContactFromNearAndFlat) {
 // Pixels need not be square.
 TEST(Truth, CoversEveryTaxelsSquareOfAnyArray) {
   const std::pair<TaxelArray, ImageGrid> cases[] = {
+      {{}, {16, 16, 0.75}},
       {{.rows = 2, .columns = 6, .pitch_mm = 2}, {8, 24, 0.5}},
       {{.rows = 2, .columns = 3, .pitch_mm = {4, 2}}, {8, 12, {1, 0.5}}}};
   for (const auto& [array, grid] : cases) {
     SCOPED_TRACE(array.text());
     EXPECT_EQ(array.picture(4), grid);
     std::vector<float> image(grid.pixels());
-    truth_image(one_blob(), 15, 52, grid, image);  // x 9 .. 21, y 50 .. 54
+    truth_image(one_blob(), 15, 52, grid, image);
     for (int r = 0; r < grid.height; ++r)
       for (int c = 0; c < grid.width; ++c) {
-        const double x = 9 + (c + 0.5) * grid.pixel_mm.x, y = 50 + (r + 0.5) * grid.pixel_mm.y;
+        const double x = 15 + (c + 0.5 - grid.width / 2.0) * grid.pixel_mm.x,
+                     y = 52 + (r + 0.5 - grid.height / 2.0) * grid.pixel_mm.y;
         EXPECT_FLOAT_EQ(image[static_cast<std::size_t>(grid.width * r + c)],
                         static_cast<float>(one_blob().height(x, y) / 1.5));
       }

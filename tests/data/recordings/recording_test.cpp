@@ -96,10 +96,6 @@ TEST(Recording, ATensorIsNamedForWhatItHolds) {
 TEST(Recording, RefusesAnArrayThatIsNone) {
   TemporaryFolder folder;
   Recording recording = example();
-  recording.metadata["array"] = "4x4";
-  EXPECT_ERROR(write_recording(folder.file("a"), recording), std::invalid_argument,
-               "is a member of the recording");
-  recording = example();
   recording.array.rows = 65;
   recording.signals.resize(recording.frames() * 17 * 4);
   EXPECT_REFUSAL("write_recording: signals has 476 values, expected 1820 for 7 frames",
@@ -155,10 +151,14 @@ TEST(Recording, KnowsWhatBreaksARule) {
 
 TEST(Recording, IsNeitherWrittenNorReadThatBreaksARule) {
   const TemporaryFolder folder;
+  for (const std::string member : {"plate", "array"}) {
+    Recording recording = example();
+    recording.metadata[member] = "4x4";
+    EXPECT_REFUSAL(
+        "write_recording: the metadata field '" + member + "' is a member of the recording; set it there",
+        write_recording(folder.file("a"), recording));
+  }
   Recording recording = example();
-  recording.metadata["plate"] = "x";
-  EXPECT_REFUSAL("write_recording: the metadata field 'plate' is a member of the recording; set it there",
-                 write_recording(folder.file("a"), recording));
   recording.signals.pop_back();
   EXPECT_REFUSAL("write_recording: signals has 111 values, expected 112 for 7 frames",
                  write_recording(folder.file("a"), recording));

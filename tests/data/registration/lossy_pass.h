@@ -33,11 +33,12 @@ inline Recording slide_of(const Recording& whole) {
   return slide;
 }
 
-inline Recording full_pass(const std::string& plate, int pass, std::uint64_t seed) {
+inline Recording full_pass(const std::string& plate, int pass, std::uint64_t seed, double speed = 10,
+                           double lost_fraction = 0) {
   SimulatorSettings settings;
   settings.rate_hz = kBoardHz;
-  settings.lost_fraction = 0;
-  return slide_of(simulate_pass(Plate::named(plate), {.pass = pass}, settings, seed));
+  settings.lost_fraction = lost_fraction;
+  return slide_of(simulate_pass(Plate::named(plate), {.pass = pass, .speed_mm_s = speed}, settings, seed));
 }
 
 // Without the frames at..at + lost - 1, and with stamps that count those that are left.
@@ -69,10 +70,7 @@ inline constexpr double kLineHz = 812;
 // but the nominal ones. The true positions stay with the frames for comparison.
 inline Recording like_the_rig(const std::string& plate, int pass, std::uint64_t seed, double late_s = 0,
                               double early_s = 0, double speed = 10) {
-  SimulatorSettings settings;
-  settings.rate_hz = kBoardHz;
-  const Recording full =
-      slide_of(simulate_pass(Plate::named(plate), {.pass = pass, .speed_mm_s = speed}, settings, seed));
+  const Recording full = full_pass(plate, pass, seed, speed, SimulatorSettings().lost_fraction);
   Recording text = full;
   text.time_s.clear(), text.signals.clear(), text.position_mm.clear();
   text.source = "imported";

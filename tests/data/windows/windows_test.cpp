@@ -8,10 +8,6 @@
 
 namespace supertac::windows_test {
 
-std::size_t sum_of_reasons(const WindowCounts& c) {
-  return c.unreliable + c.no_position + c.lifting + c.too_early + c.off_stride + c.windows;
-}
-
 TEST(Windows, AreTheLastFramesOfAPass) {
   WindowSet set(wide_settings(16));
   const Recording recording = make_recording({});
@@ -111,7 +107,9 @@ TEST(Windows, CountEveryFrameOnce) {
   const WindowCounts& counts = set.counts();
   EXPECT_EQ(counts.recordings, 3U);
   EXPECT_EQ(counts.frames, 300U);
-  EXPECT_EQ(sum_of_reasons(counts), counts.frames);
+  EXPECT_EQ(counts.unreliable + counts.no_position + counts.lifting + counts.too_early + counts.off_stride +
+                counts.windows,
+            counts.frames);
   EXPECT_EQ(counts.no_position, 100U);
   EXPECT_EQ(counts.unreliable, 100U);
   EXPECT_EQ(counts.lifting, 39U);

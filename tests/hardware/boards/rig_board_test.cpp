@@ -93,12 +93,6 @@ std::vector<std::byte> some_frames(int count) {
   return bytes;
 }
 
-std::unique_ptr<Port> hundred_frames() {
-  std::vector<ScriptedPort::Read> reads;
-  for (int i = 0; i < 10; ++i) reads.push_back({10 + 0.01 * i, some_frames(10)});
-  return std::make_unique<ScriptedPort>(reads);
-}
-
 // A minute in which the machine stands still is none of half a second's.
 TEST(Listen, ListensForAsLongAsTheMachineRuns) {
   std::vector<ScriptedPort::Read> reads;
@@ -108,7 +102,9 @@ TEST(Listen, ListensForAsLongAsTheMachineRuns) {
 }
 
 TEST(RigBoard, StoppingDoesNotWaitForAConsumerThatIsGone) {
-  SensorReader board({.port = hundred_frames(), .live = false}, Sensor{}, {.queue_frames = 15});
+  const std::vector<ScriptedPort::Read> reads(10, {10, some_frames(10)});
+  SensorReader board({.port = std::make_unique<ScriptedPort>(reads), .live = false}, Sensor{},
+                     {.queue_frames = 15});
   ASSERT_TRUE(board.next(kPatience));
   board.stop();
   EXPECT_TRUE(board.next(0));

@@ -28,20 +28,21 @@ std::vector<ReadFrame> all_of(SensorReader& reader, std::size_t most = 1'000'000
   return frames;
 }
 
-/// Sends datagrams to a port of this computer.
+/// Sends datagrams to a free port of this computer.
 class UdpSender {
  public:
-  explicit UdpSender(int port) : to_(at_port(port)) {}
+  UdpSender() = default;
   ~UdpSender() { close(out_); }
   UdpSender(const UdpSender&) = delete;
   UdpSender& operator=(const UdpSender&) = delete;
+  std::string port() const { return std::to_string(ntohs(to_.sin_port)); }
   void send(const std::string& bytes) const {
     sendto(out_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to_), sizeof to_);
   }
 
  private:
   int out_ = socket(AF_INET, SOCK_DGRAM, 0);
-  sockaddr_in to_;
+  sockaddr_in to_ = at_port(free_port(SOCK_DGRAM));
 };
 
 std::string refusal(const std::string& address) {
@@ -63,23 +64,26 @@ TEST(OpenPort, RefusesInOneLine) {
             0U);
 }
 
+// Without stamps frames are a period apart: they were dated by the speed at which the file was read.
 TEST(SensorReader, ReadsAFileToItsEndWithoutLoss) {
-  const TemporaryFolder folder;
-  const Sensor sensor = mat(2, 3, 100, R"({"kind":"text","time":{"column":0,"unit":"ms"}})");
-  std::string text = "booting\n";
-  for (int n = 0; n < 10'000; ++n) text += sent_frame(sensor, numbered(sensor, n), 5 + 0.01 * n);
-  text.resize(text.size() - 2);  // no line feed behind the last
-  write_file(folder / "frames.csv", text);
-  SensorReader reader(open_port(folder / "frames.csv"), sensor);
-  EXPECT_FALSE(reader.live());
-  while (reader.counters().decoder.frames == 0) usleep(1000);  // it runs into its full queue
-  const std::vector<ReadFrame> frames = all_of(reader);
-  ASSERT_EQ(frames.size(), 10'000U);
-  EXPECT_NEAR(frames.back().date.time_s - frames.front().date.time_s, 99.99, 1e-6);
-  EXPECT_EQ(frames.back().signals.front(), 9999);
-  const ReaderCounters counters = reader.counters();
-  EXPECT_EQ(counters.decoder.torn, 1U);  // "booting"
-  EXPECT_EQ(counters.missing + counters.dropped, 0U);
+  for (const char* time : {R"(,"time":{"column":0,"unit":"ms"})", ""}) {
+    const TemporaryFolder folder;
+    const Sensor sensor = mat(2, 3, 100, R"({"kind":"text")" + std::string(time) + "}");
+    std::string text = "booting\n";
+    for (int n = 0; n < 30'000; ++n) text += sent_frame(sensor, numbered(sensor, n), 5 + 0.01 * n);
+    text.resize(text.size() - 2);  // no line feed behind the last
+    write_file(folder / "frames.csv", text);
+    SensorReader reader(open_port(folder / "frames.csv"), sensor);
+    EXPECT_FALSE(reader.live());
+    while (reader.counters().decoder.frames == 0) usleep(1000);  // it runs into its full queue
+    const std::vector<ReadFrame> frames = all_of(reader);
+    ASSERT_EQ(frames.size(), 30'000U);
+    EXPECT_NEAR(frames.back().date.time_s - frames.front().date.time_s, 299.99, 1e-6);
+    EXPECT_EQ(frames.back().signals.front(), 29'999);
+    const ReaderCounters counters = reader.counters();
+    EXPECT_EQ(counters.decoder.torn, 1U);  // "booting"
+    EXPECT_EQ(counters.missing + counters.dropped, 0U);
+  }
 }
 
 TEST(SensorReader, CountsWhatIsLostLateAndDamaged) {
@@ -130,24 +134,10 @@ TEST(SensorReader, AClockInAnotherUnitIsRefused) {
   EXPECT_EQ(said_of_clock("ms", -5'000'000), "nothing") << "it was set after half a second";
 }
 
-// They were dated by the speed at which the file was read.
-TEST(SensorReader, FramesOfAFileWithoutStampsAreAPeriodApart) {
-  const TemporaryFolder folder;
-  std::string lines;
-  for (int n = 0; n < 30'000; ++n) lines += std::to_string(n) + ",7\n";
-  write_file(folder / "frames.csv", lines);
-  SensorReader reader(open_port(folder / "frames.csv"), mat(1, 2, 100, R"({"kind":"text"})"));
-  const std::vector<ReadFrame> frames = all_of(reader);
-  ASSERT_EQ(frames.size(), 30'000U);
-  EXPECT_NEAR(frames.back().date.time_s - frames.front().date.time_s, 299.99, 1e-6);
-  EXPECT_EQ(reader.counters().missing, 0U);
-}
-
 TEST(SensorReader, LosesNothingOfAThousandFramesOf16x16OverUdp) {
   const Sensor sensor = mat(16, 16, 1000, R"({"kind":"binary","header":"AA55","type":"u16"})");
-  const int port = free_port(SOCK_DGRAM);
-  SensorReader reader(open_port("udp:127.0.0.1:" + std::to_string(port)), sensor);
-  const UdpSender out(port);
+  const UdpSender out;
+  SensorReader reader(open_port("udp:127.0.0.1:" + out.port()), sensor);
   // The kernel keeps some 200 kB for a reader: one whose machine is busy elsewhere is waited for.
   constexpr std::uint64_t kUnderWay = 64;
   const std::jthread sender([&](const std::stop_token& over) {
@@ -163,18 +153,16 @@ TEST(SensorReader, LosesNothingOfAThousandFramesOf16x16OverUdp) {
 
 TEST(SensorReader, ADatagramOfTextIsALine) {
   const Sensor sensor = mat(1, 3, 100, R"({"kind":"text"})");
-  const int port = free_port(SOCK_DGRAM);
-  SensorReader reader(open_port("udp::" + std::to_string(port), true), sensor);
-  const UdpSender out(port);
+  const UdpSender out;
+  SensorReader reader(open_port("udp::" + out.port(), true), sensor);
   for (int n = 0; n < 20; ++n) out.send("1,2,3");
   EXPECT_EQ(all_of(reader, 20).size(), 20U);
 }
 
 // A datagram of nothing is none, and does not prolong the wait.
 TEST(OpenPort, EmptyDatagramsAreNotReadBeyondTheDeadline) {
-  const int port = free_port(SOCK_DGRAM);
-  const OpenedPort opened = open_port("udp::" + std::to_string(port));
-  const UdpSender out(port);
+  const UdpSender out;
+  const OpenedPort opened = open_port("udp::" + out.port());
   for (const char* bytes : {"", "", "x"}) out.send(bytes);
   std::array<std::byte, 16> buffer{};
   EXPECT_EQ(opened.port->read(buffer, 0).count, 0U);

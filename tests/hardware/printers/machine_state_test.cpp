@@ -104,11 +104,13 @@ TEST(MachineState, AHomeOffsetIsRefusedByNameWhereItShiftsTheBed) {
   EXPECT_EQ(bench.printer.origin(), Printer::Origin::confirmed);
 }
 
-TEST(MachineState, HomingLiftsTenMillimetresWhateverTheUnit) {
-  for (const LeftOver& left : {LeftOver{.inches = true}, LeftOver{.relative = true}}) {
-    RigSettings settings = running_rig({.left_over = left});
-    settings.printer.head = {20, 30, 15};
-    PrinterBench bench(settings);
+TEST(MachineState, HomingFirstLiftsTenMillimetresWhateverTheUnit) {
+  constexpr Point3 kHead = {20, 30, 15};
+  for (const VirtualPrinterSettings& printer : {VirtualPrinterSettings{.head = kHead},
+                                                {.firmware = Firmware::klipper, .head = kHead},
+                                                {.head = kHead, .left_over = {.inches = true}},
+                                                {.head = kHead, .left_over = {.relative = true}}}) {
+    PrinterBench bench(running_rig(printer));
     double highest = 0;
     bench.printer.link().set_watch([&] {
       if (bench.head().x > 19.9) highest = std::max(highest, bench.head().z);
@@ -116,6 +118,7 @@ TEST(MachineState, HomingLiftsTenMillimetresWhateverTheUnit) {
     bench.printer.home();
     EXPECT_GT(highest, 24.9);
     EXPECT_LT(highest, 30.1) << "10 mm, and homing's own 5";
+    EXPECT_EQ(bench.printer.origin(), Printer::Origin::homed);
   }
 }
 
@@ -199,7 +202,8 @@ TEST(MachineState, AHeatersErrorEndsARunOnlyWhereTheMachineHalts) {
   });
   EXPECT_TRUE(goes_on.outcome.complete) << goes_on.outcome.note;
   Interrupted halts({}, [](PrinterBench& bench) { bench.firmware().overheat(bench.rig.now()); });
-  EXPECT_ERROR(std::rethrow_exception(halts.outcome.error), PrinterHalted, "MAXTEMP");
+  EXPECT_ERROR(std::rethrow_exception(halts.outcome.error), PrinterHalted,
+               "MAXTEMP triggered, system stopped! Heater_ID: E0");
 }
 
 TEST(MachineState, AQuoteIsMatchedWhereItStands) {

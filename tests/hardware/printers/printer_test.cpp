@@ -78,22 +78,6 @@ TEST(Printer, PlainM114IsNotBelieved) {
   EXPECT_NEAR(bench.printer.sample_position()->position.x, 99.7, 1e-6) << "the head has not moved yet";
 }
 
-TEST(Printer, HomesWithTheFingerUp) {
-  for (const Firmware firmware : {Firmware::marlin, Firmware::klipper}) {
-    PrinterBench bench(running_rig({.firmware = firmware}));
-    bench.printer.home();
-    const auto& executed = bench.firmware().executed();
-    std::size_t lift = 0, home = 0;
-    for (std::size_t i = 0; i < executed.size(); ++i) {
-      if (executed[i].starts_with("G1 Z10")) lift = i;
-      if (executed[i] == "G28") home = i;
-    }
-    EXPECT_GT(lift, 0U);
-    EXPECT_LT(lift, home);
-    EXPECT_EQ(bench.printer.origin(), Printer::Origin::homed);
-  }
-}
-
 TEST(Printer, MarlinsSilentClampIsFound) {
   PrinterBench bench(running_rig({.bed = {100, 235, 250}}));  // smaller than the limits claim
   bench.printer.home();
@@ -187,9 +171,6 @@ TEST(RealMarlin, TheLineBeforeAHaltIsInTheError) {
   PrinterBench bench(running_rig({.homing_fails = true}));
   EXPECT_ERROR(bench.printer.home(), PrinterHalted,
                "the firmware halted ('echo:Homing Failed', 'Error:Printer halted. kill() called!')");
-  PrinterBench hot;
-  hot.firmware().overheat(hot.rig.now());
-  EXPECT_ERROR(hot.printer.queue_position(), PrinterHalted, "Heater_ID: E0");
 }
 
 RigSettings klipper_rig() { return running_rig({.firmware = Firmware::klipper}); }
