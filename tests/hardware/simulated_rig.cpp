@@ -55,16 +55,15 @@ class SimulatedRig::PrinterPort : public FakePort {
   SimulatedRig& rig_;
 };
 
-class SimulatedRig::BoardPort : public Port {
+class SimulatedRig::BoardPort : public FakePort {
  public:
-  explicit BoardPort(SimulatedRig& rig) : rig_(rig) {}
+  explicit BoardPort(SimulatedRig& rig) : rig_(rig) { name_ = "simulated board"; }
   ~BoardPort() override {
     std::lock_guard lock(rig_.mutex_);
     rig_.board_listens_ = false;
     rig_.board_chunks_.clear();
     rig_.changed_.notify_all();
   }
-  const std::string& name() const override { return name_; }
   /// Its first use opens the port: from here on simulated time waits for the reader.
   double now() override {
     std::lock_guard lock(rig_.mutex_);
@@ -99,7 +98,6 @@ class SimulatedRig::BoardPort : public Port {
 
  private:
   SimulatedRig& rig_;
-  std::string name_ = "simulated board";
   bool ended_ = false;
 };
 

@@ -2,6 +2,7 @@
 
 #include "hardware/printers/marlin_link.h"
 #include "hardware/virtual_rig/virtual_rig.h"
+#include "tests/hardware/fake_port.h"
 #include "tests/support/test.h"
 
 namespace supertac::virtual_rig_rig_test {
@@ -31,8 +32,7 @@ TEST(PlainRig, RunsNoDamagedLineAndSaysWhatItDoesNotKnow) {
   PlainRig rig([](double, double, double, double) { return TaxelVolts{}; }, 0);
   const auto said = [&rig](const std::string& line) {
     rig.to_printer(std::as_bytes(std::span(line)));
-    const auto bytes = rig.from_printer();
-    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    return as_text(rig.from_printer());
   };
   const std::string refused = ", Last Line: 0\nResend: 1\nok\n", none = "Error:No Checksum with line number";
   EXPECT_EQ(said(numbered_line(0, "M110 N0")), "ok\n");
