@@ -3,13 +3,19 @@
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/attention.h"
+#include "autograd/record.h"
 
 namespace supertac {
 
 static constexpr Dim kReduction = 4;  // of channels, in between
 
+static Dim squeezed(Dim channels) {
+  if (channels < kReduction) refuse("ChannelAttention", "channels", "4 or more", std::to_string(channels));
+  return channels / kReduction;
+}
+
 ChannelAttention::ChannelAttention(Dim channels, Rng& rng)
-    : squeeze_(add("squeeze", Linear(channels, channels / kReduction, rng, Layout::pointwise))),
+    : squeeze_(add("squeeze", Linear(channels, squeezed(channels), rng, Layout::pointwise))),
       expand_(add("expand", Linear(channels / kReduction, channels, rng, Layout::pointwise))) {}
 
 Variable ChannelAttention::gates(const Variable& x) const {

@@ -43,7 +43,8 @@ auto guarded(const char* function, std::initializer_list<const void*> pointers, 
 template <class Description>
 int describe(Description* to, Description full) {
   if (to->size < sizeof(std::size_t))
-    refuse("describe", "description.size", "sizeof(*description)", std::to_string(to->size));
+    refuse("describe", "description.size", "sizeof(*description), set before the call",
+           std::to_string(to->size));
   full.size = std::min(to->size, sizeof full);
   std::memcpy(to, &full, full.size);
   return 0;

@@ -23,7 +23,8 @@ bool is_drawn(const std::string& split) { return split != "trial" && split != "n
 // "trial", "pass (seed 3)", "texture (leaving out 6_Bumps)": a split and what decides which windows it tests.
 std::string described(const std::string& split, const std::string& left_out, const std::string& seed) {
   if (!is_drawn(split)) return split;
-  return split + (left_out.empty() ? " (seed " + seed + ")" : " (leaving out " + left_out + ")");
+  const bool leaves_out = (split == "texture" || split == "group") && !left_out.empty();
+  return split + (leaves_out ? " (leaving out " + left_out + ")" : " (seed " + seed + ")");
 }
 std::string described(const ModelFile& file) {
   return described(value_or(file.metadata, "split", "none"), value_or(file.metadata, "leave_out"),

@@ -23,9 +23,8 @@ namespace supertac {
 struct TestSet {
   std::string split_name;
   std::uint64_t seed = 0;
-  std::vector<std::string>
-      leave_out;  ///< of split texture or group, what is tested; none = drawn with the seed
-  Split split;    ///< its test side is tested, the baselines are fitted to its training side
+  std::vector<std::string> leave_out;  ///< split texture or group: what is tested; none = drawn by the seed
+  Split split;  ///< its test side is tested, the baselines are fitted to its training side
 };
 
 /// --split and --seed, or the model's own; the split itself is left to the caller.

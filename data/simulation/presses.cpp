@@ -107,9 +107,9 @@ class Press {
     std::vector<double> shares(taxels * channels);
     for (std::size_t channel = 0; channel < channels; ++channel) {
       const std::vector<double> load =
-          felt(sensor_.array, pressure_, 1, static_cast<std::size_t>(field_.columns),
-               channels == 3 && channel == 0 ? across_.lean : across_.load,
-               channels == 3 && channel == 1 ? along_.lean : along_.load);
+          taxel_loads(sensor_.array, pressure_, 1, static_cast<std::size_t>(field_.columns),
+                      channels == 3 && channel == 0 ? across_.lean : across_.load,
+                      channels == 3 && channel == 1 ? along_.lean : along_.load);
       for (std::size_t k = 0; k < taxels; ++k)
         shares[k * channels + channel] =
             load[k] * strength_ * (1 + kTaxelSpread * random_.normal(kTaxels + k));

@@ -73,12 +73,13 @@ TaxelWeights::TaxelWeights(int lines, double pitch, int places, double first, do
   }
 }
 
-std::vector<double> felt(const TaxelArray& array, std::span<const double> pressed, std::size_t across_step,
-                         std::size_t along_step, const std::vector<double>& across_weights,
-                         const std::vector<double>& along_weights) {
+std::vector<double> taxel_loads(const TaxelArray& array, std::span<const double> pressed,
+                                std::size_t across_step, std::size_t along_step,
+                                const std::vector<double>& across_weights,
+                                const std::vector<double>& along_weights) {
   const auto rows = static_cast<std::size_t>(array.rows), columns = static_cast<std::size_t>(array.columns),
              across = across_weights.size() / columns, along = along_weights.size() / rows;
-  std::vector<double> felt;
+  std::vector<double> loads;
   for (std::size_t row = 0; row < rows; ++row) {
     std::vector<double> line(across);
     for (std::size_t j = 0; j < along; ++j)
@@ -87,9 +88,9 @@ std::vector<double> felt(const TaxelArray& array, std::span<const double> presse
           line[i] += weight * pressed[i * across_step + j * along_step];
     for (auto weights = across_weights.begin(); weights != across_weights.end();
          weights += static_cast<std::ptrdiff_t>(across))
-      felt.push_back(std::inner_product(line.begin(), line.end(), weights, 0.0));
+      loads.push_back(std::inner_product(line.begin(), line.end(), weights, 0.0));
   }
-  return felt;
+  return loads;
 }
 
 FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const PassSettings& of_pass,
@@ -204,7 +205,7 @@ std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) co
       settings_.vibration_mm * same_bits::rough_sine(settings_.vibration_hz * time_s + vibration_phase_);
   const std::vector<double> depth = indented(shaken);
   const auto felt_by = [&](const std::vector<double>& across, const std::vector<double>& along) {
-    return felt(settings_.array, depth, static_cast<std::size_t>(along_), 1, across, along);
+    return taxel_loads(settings_.array, depth, static_cast<std::size_t>(along_), 1, across, along);
   };
   const std::vector<double> load = felt_by(across_weights_.load, along_weights_.load);
   const double emi = settings_.emi_volts * same_bits::rough_sine(settings_.emi_hz * time_s + emi_phase_);

@@ -73,9 +73,10 @@ struct TaxelWeights {
 
 /// The sum of what presses the places, weighted for each taxel [rows][columns] of an array: place (i, j)
 /// across and along is pressed[i * across_step + j * along_step], 0 or more.
-std::vector<double> felt(const TaxelArray& array, std::span<const double> pressed, std::size_t across_step,
-                         std::size_t along_step, const std::vector<double>& across_weights,
-                         const std::vector<double>& along_weights);
+std::vector<double> taxel_loads(const TaxelArray& array, std::span<const double> pressed,
+                                std::size_t across_step, std::size_t along_step,
+                                const std::vector<double>& across_weights,
+                                const std::vector<double>& along_weights);
 
 /// The finger's voltages over a plate, one per taxel: contact of an elastic pad on a yielding mount, then the
 /// sensor. A pure function of pose and time, used alike by the simulator and by the virtual rig. Lengths,

@@ -56,8 +56,13 @@ std::vector<std::string_view> split_line(std::string_view line, char separator) 
 }
 
 std::vector<std::string> comma_list(const std::string& text) {
-  const std::vector<std::string_view> words = split_line(text, ',');
-  return {words.begin(), words.end()};
+  std::vector<std::string> words;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t comma = std::min(text.find(',', at), text.size());
+    words.push_back(text.substr(at, comma - at));
+    at = comma + 1;
+  }
+  return words;
 }
 
 }  // namespace supertac

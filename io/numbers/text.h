@@ -38,7 +38,7 @@ std::string_view trimmed(std::string_view text);
 /// space.
 std::vector<std::string_view> split_line(std::string_view line, char separator);
 
-/// The parts between the commas, as split_line().
+/// The parts between the commas, untrimmed; none for an empty text, and none behind a last comma.
 std::vector<std::string> comma_list(const std::string& text);
 
 /// The words or numbers, or that member or function of each, with `between` between them.

@@ -25,8 +25,7 @@ TEST(Module, RefusesALayerWithoutInputsOrChannels) {
   Rng rng(1);
   EXPECT_REFUSAL("uniform_fan_in: shape expects an input and a kernel of 1 or more, got [0,0,3,8]",
                  Conv2d(3, 8, {.kernel = 0}, rng));
-  EXPECT_REFUSAL("uniform_fan_in: shape expects an input and a kernel of 1 or more, got [0,3]",
-                 ChannelAttention(3, rng));
+  EXPECT_REFUSAL("ChannelAttention: channels expects 4 or more, got 3", ChannelAttention(3, rng));
   EXPECT_NO_THROW(ChannelAttention(4, rng));
 }
 

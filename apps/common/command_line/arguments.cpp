@@ -307,7 +307,7 @@ std::vector<std::string> Arguments::list(const std::string& name) const {
   const std::string value = text(name);
   const std::vector<std::string> elements = comma_list(value);
   for (const std::string& element : elements) {
-    if (element.empty()) reject(name, "a list without empty elements", value);
+    if (trimmed(element).empty()) reject(name, "a list without empty elements", value);
     if (!seen.insert(element).second) reject(name, "every element once", value);
   }
   if (value.ends_with(',')) reject(name, "a list without empty elements", value);

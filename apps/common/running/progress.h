@@ -54,8 +54,8 @@ class Progress {
   std::chrono::steady_clock::time_point begin_, last_;
 };
 
-/// To be called for each part of long work that knows nothing of programs, the first part with a `done` of 0:
-/// shows how far `what` is, in `unit`, and ends it by Interrupted after a signal.
+/// To be called for each part of long work that knows nothing of programs: shows how far `what` is, in
+/// `unit`, from the beginning again where `done` is 0, and ends it by Interrupted after a signal.
 std::function<void(std::size_t done, std::size_t all)> progress_of(const Arguments& arguments,
                                                                    const std::string& what,
                                                                    const std::string& unit);

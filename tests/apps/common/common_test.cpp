@@ -65,6 +65,8 @@ TEST(Arguments, MistakesAreNamed) {
       {{"x", "--list", "1,nan"}, "--list: expected numbers from 0 to 9, found 'nan'"},
       {{"x", "--list", "1,,2"}, "--list: expected a list without empty elements, found '1,,2'"},
       {{"x", "--list", "1,"}, "--list: expected a list without empty elements, found '1,'"},
+      {{"x", "--list", " "}, "--list: expected a list without empty elements, found ' '"},
+      {{"x", "--list", "1, "}, "--list: expected a list without empty elements, found '1, '"},
       {{"x", "--list", "1,1"}, "--list: expected every element once, found '1,1'"},
       {{"x", "--kind", "bumbs"},
        "--kind: expected one of ridges, bumps, found 'bumbs'; did you mean 'bumps'?"}};
