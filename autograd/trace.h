@@ -13,7 +13,7 @@
 
 namespace supertac {
 
-/// The settings of an op besides its inputs; each op fills in those that it has.
+/// The settings of an op besides its inputs, as far as a plan, an exporter or a referee of the op needs them.
 struct OpSettings {
   kernels::ConvSettings conv{};      ///< convolutions
   real negative_slope = 1;           ///< convolutions, linear layers, relu and leaky_relu

@@ -59,7 +59,7 @@ SUPERTAC_API const char* supertac_error(void);
    SUPERTAC_FP32 or SUPERTAC_INT8. NULL on failure. */
 SUPERTAC_API supertac_model* supertac_open(const char* path, int precision);
 SUPERTAC_API supertac_model* supertac_open_memory(const void* bytes, size_t size, int precision);
-/* What was opened; NULL is allowed. Its supertac_live have to be freed before. */
+/* Frees a model; NULL is allowed. Its supertac_live and supertac_map have to be freed before. */
 SUPERTAC_API void supertac_close(supertac_model* model);
 
 /* 0, or -1. */
@@ -81,7 +81,8 @@ SUPERTAC_API supertac_live* supertac_live_new(const supertac_model* model, doubl
 SUPERTAC_API void supertac_live_free(supertac_live* live);
 
 /* One frame [signals], row by row, in the sensor's unit; time_s is the sensor's clock. 0, or -1 for a null
-   pointer. A frame that is not finite or not later than the one before counts as lost. */
+   pointer. A frame that is not finite, or not later than the one before, is left out; where time steps back by
+   more than a gap, the window begins anew. */
 SUPERTAC_API int supertac_live_push(supertac_live* live, double time_s, const float* frame);
 
 /* The picture that ends with the newest frame, and its predicted error unless that is NULL. 1: written; 0:

@@ -152,8 +152,8 @@ PassesReport write_passes(const Arguments& arguments, const std::string& path, O
     keep_plate_file((fs::path(path).parent_path() / header.plate).string(), folder.path());
   const FrameTimeline& clock = collection.clock;
   if (!clock.plausible)
-    arguments.note("warning: the board's period is " + format(1e6 * clock.measured_s, 1) + " us, expected " +
-                   format(1e6 * rig::kFramePeriodS, 0) + " +- 0.5 %; the nominal one is used");
+    arguments.note("warning: frames came every " + format(1e6 * clock.measured_s, 1) + " us, expected " +
+                   format(1e6 * clock.period_s, 1) + " us; the stated period is used");
   report.json = {{"folder", arguments.text("out")},
                  {"journal", path},
                  {"plate", header.plate},

@@ -183,7 +183,6 @@ NamedMap Stream::named(MapCells cells) const {
   return map;
 }
 
-// Empty where frames come as often as the source says, to a twentieth.
 std::string Stream::rate_remark() const {
   constexpr double kLongEnoughS = 1, kMostOff = 1.05;
   const double seconds = last_s_ - first_s_, stated = 1 / source_.period_s();

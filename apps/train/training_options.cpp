@@ -57,7 +57,7 @@ static void declare_windows(Arguments& a) {
            "0");
   a.option("range", "REST,SPAN",
            "a signal V becomes clip((REST - V) / SPAN, 0, 1), in the unit of the recordings; auto: "
-           "the rig's 2.45,0.36, or where it does not fit what the recordings show",
+           "the range that the recordings state, or where it does not fit what they show",
            "auto");
   a.option(
       "scaling", "NAME",

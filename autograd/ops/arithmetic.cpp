@@ -36,6 +36,7 @@ Variable operator*(real factor, const Variable& x) {
       [factor](real gy, real, real) { return factor * gy; }, {.factor = factor});
 }
 
+// a, b of one shape, y = a - b;  ga = gy, gb = -gy, by the ops above
 Variable operator-(const Variable& a, const Variable& b) {
   check_same_shape("subtract", "a", a, "b", b);
   return a + -1 * b;

@@ -40,7 +40,7 @@ Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows
 
 }  // namespace
 
-// x [N,H,W,C], y [N,H/2,W/2,C];  gx[where the largest was] += gy
+// x [N,H,W,C], y [N,H/2,W/2,C];  gx[where the largest was] = or += gy
 Variable max_pool2d(const Variable& x) {
   check_rank("max_pool2d", "x", x, 4);
   if (x.dim(1) < 2 || x.dim(2) < 2) refuse("max_pool2d", "x", "H, W >= 2", x.shape().text());
@@ -51,7 +51,7 @@ Variable max_pool2d(const Variable& x) {
   });
 }
 
-// xs[i] [...,last i] -> y [..., sum of last i], side by side;  gx[i] += its columns of gy
+// xs[i] [...,last i] -> y [..., sum of last i], side by side;  gx[i] = or += its columns of gy
 Variable concat(std::span<const Variable> xs) {
   if (xs.empty() || xs.size() > kMaxInputs)
     refuse("concat", "xs", "1 to " + std::to_string(kMaxInputs) + " inputs", std::to_string(xs.size()));

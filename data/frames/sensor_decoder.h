@@ -43,7 +43,7 @@ class SensorDecoder {
 /// one.
 std::unique_ptr<SensorDecoder> make_decoder(const Sensor& sensor);
 
-/// All numbers of a JSON value, nested arrays in turn; false when it holds anything else.
+/// All numbers of a JSON value, nested arrays in turn, null as NaN; false when it holds anything else.
 bool flatten(const nlohmann::ordered_json& json, std::vector<float>& numbers);
 
 }  // namespace supertac

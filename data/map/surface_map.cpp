@@ -136,7 +136,7 @@ void SurfaceMap::add(double x_mm, double y_mm, std::span<const float> picture,
   if (picture.size() != grid_.pixels() || (!errors.empty() && errors.size() != picture.size()) ||
       (pictures_ > 0 && has_errors_ == errors.empty()))
     throw std::invalid_argument(
-        "map: expected pictures of " + grid_.text() + " pixels, all with errors or all " + "without, got " +
+        "map: expected pictures of " + grid_.text() + " pixels, all with errors or all without, got " +
         std::to_string(picture.size()) + " and " + std::to_string(errors.size()) + " errors");
   constexpr double kFarthest = 1e15;  // whole numbers are exact below
   const Pitch pixel = grid_.pixel_mm;

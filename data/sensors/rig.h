@@ -1,5 +1,5 @@
 // The rig's geometry and timing, each number once. It includes nothing else of the library, so that data/
-// (simulation, recordings) and hardware/ (the drivers) share it as the target supertac_rig.
+// (simulation, recordings) and hardware/ (the drivers) share it.
 #pragma once
 
 #include <algorithm>

@@ -25,8 +25,9 @@ struct SimulatorSettings {
   /// The finger gives way: a bump under one row lifts the other rows. Cubic mm of indented pad per mm, of a
   /// flat body as large as the rig's pad.
   double mount_stiffness = 15;
-  Body body = Body::of_rig();  ///< a skin that is not known is the rig's; its shape touches an element before
-                               ///< a taxel is above it; its skin is the pad
+  /// A dome touches an element before a taxel is above it; the skin blurs as sigma_mm() says, and is the
+  /// rig's where none is known.
+  Body body = Body::of_rig();
   bool with_edges = true;      ///< beside the plate there is nothing to touch
   double tilt_spread = 0.01;   ///< the finger's rear rows ride lower
   bool with_gains = true;      ///< taxels differ: the outer columns feel most

@@ -23,7 +23,7 @@ struct Range {
   float rest, top;
 };
 
-// Lower edges of the bins that hold the two percentiles of one signal.
+// Lower edges of the bins that hold rest and top of one signal.
 Range range_of(std::span<const std::uint16_t, kBins> counts, std::size_t frames) {
   const std::size_t below = frames / kRestShare, above = std::min(kTopRank, frames);
   std::size_t rest = 0, top = kBins - 1;

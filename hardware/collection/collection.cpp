@@ -156,8 +156,8 @@ void add_frames(CollectedPass& pass, const CollectedFrames& all, std::size_t sig
   }
   pass.missing = last - before;
   if (!all.clock.plausible)
-    pass.doubt = "the board's clock says " + format(1e6 * all.clock.measured_s, 1) +
-                 " us a frame, the nominal " + format(1e6 * rig::kFramePeriodS, 0) + " are used; ";
+    pass.doubt = "frames came every " + format(1e6 * all.clock.measured_s, 1) + " us, the stated " +
+                 format(1e6 * all.clock.period_s, 1) + " us are used; ";
   pass.doubt += track.doubt(kTrustedMm);
   const std::uint64_t kept = pass.time_s.size(), made = kept + pass.left_out + pass.missing;
   if (static_cast<double>(kept) < 0.75 * static_cast<double>(made))

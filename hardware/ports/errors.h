@@ -1,5 +1,5 @@
 // Everything that can go wrong with a device, as types: a program decides by type, a person reads what().
-// Every message names the port, what was expected, what was found, and the next step.
+// A message names the port, what was expected, what was found, and the next step where there is one to take.
 #pragma once
 
 #include <stdexcept>

@@ -58,9 +58,9 @@ struct OpenedPort {
 /// s: who waits for bytes looks after so long whether to go on.
 constexpr double kReadSlice = 0.05;
 
-/// `serial:DEVICE@BAUD` ("auto" finds the rig's board), udp:[HOST]:PORT (listens), tcp:HOST:PORT (connects,
-/// at most 5 s), "-" for standard input, or the path of a file or FIFO. `lines`: a datagram ends a line.
-/// `speedup` as SerialSettings. Throws PortError and its kinds.
+/// `serial:DEVICE@BAUD` ("auto" finds the rig's board), udp:[HOST]:PORT (listens), tcp:HOST:PORT (connects),
+/// "-" for standard input, or the path of a file or FIFO. A name server gets 5 s, a host that does not answer
+/// as many. `lines`: a datagram ends a line. `speedup` as SerialSettings. Throws PortError and its kinds.
 OpenedPort open_port(const std::string& address, bool lines = false, double speedup = 1);
 /// The port that a sensor's file names.
 OpenedPort open_port(const Sensor& sensor, double speedup = 1);

@@ -119,7 +119,8 @@ class MarlinLink {
   /// for its own.
   void stop();
 
-  /// After a command that an exception interrupted: reads until it has been acknowledged, `seconds` at most.
+  /// After a command that an exception interrupted: reads until it has been acknowledged, `seconds` at most,
+  /// then what still comes (settle()). Throws as idle().
   void abandon(double seconds);
 
   /// From this time of the port's clock on every wait throws PrinterSilent, which bounds a whole run.

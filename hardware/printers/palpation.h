@@ -95,8 +95,9 @@ std::vector<Leg> legs_within(const Limits& limits, const PalpationPlan& plan, co
 /// How long a bed's plan takes as ordered (s).
 double planned_s(const Bed& bed);
 
-/// One run of a plan with a printer whose origin is known. Throws OutsideLimits or std::invalid_argument
-/// before anything moves; after that every failure is in the outcome.
+/// One run of a plan with a printer whose origin is known. Throws OutsideLimits or std::invalid_argument, and
+/// as MarlinLink::command() while a homed printer is asked for its limits, before anything moves; after that
+/// every failure is in the outcome.
 PalpationOutcome run_palpation(Printer& printer, const PalpationPlan& plan,
                                const PalpationObserver& observer = {});
 

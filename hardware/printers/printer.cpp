@@ -142,16 +142,16 @@ void Printer::confirm_origin(const Point3& here) {
   target_ = here;
   const Point3 found = agreed_position();
   if (distance(found, here) > kToleranceMm) {
-    throw PositionError("printer: after G92 expected " + describe(here) + ", found " + describe(found) +
-                        "; confirm the origin again");
+    throw PositionError("printer " + link_.port().name() + ": after G92 expected " + describe(here) +
+                        ", found " + describe(found) + "; confirm the origin again");
   }
   origin_ = Origin::confirmed;
 }
 
 MarlinLink::Answer Printer::start_move(const Point3& target, double speed_mm_s) {
   if (origin_ == Origin::unknown) {
-    throw OriginUnknown(
-        "printer: the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
+    throw OriginUnknown("printer " + link_.port().name() +
+                        ": the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
   }
   limits_.check_path(target_, target);
   const double length = distance(target_, target);
@@ -200,8 +200,8 @@ double Printer::finish_move() {
   }
   origin_ = Origin::unknown;
   const std::optional<SoftLimits> soft = soft_limits_of(link_);
-  throw PositionError("printer: expected the head at " + describe(target_) + ", found " + describe(found) +
-                      "; confirm the origin and start again" +
+  throw PositionError("printer " + link_.port().name() + ": expected the head at " + describe(target_) +
+                      ", found " + describe(found) + "; confirm the origin and start again" +
                       (remark_.empty() ? "" : "; it said " + in_quotes(remark_)) +
                       (soft ? "; its soft endstops (M211) are on: " + in_quotes(soft->text) : ""));
 }
@@ -221,7 +221,7 @@ Point3 Printer::queue_position(double deadline_s) {
     link_.settle();
   }
   throw PrinterSilent("printer " + link_.port().name() + ": expected a position from M114, found none in " +
-                      std::to_string(kAttempts) + " answers");
+                      std::to_string(kAttempts) + " answers; check the cable");
 }
 
 Point3 Printer::agreed_position(double deadline_s) {
@@ -232,7 +232,8 @@ Point3 Printer::agreed_position(double deadline_s) {
     before = now;
   }
   throw PositionError("printer " + link_.port().name() +
-                      ": expected two equal positions in a row, found none in 7 answers; check the cable");
+                      ": expected two equal positions in a row, found none in " +
+                      std::to_string(kAttempts + 1) + " answers; check the cable");
 }
 
 bool Printer::stands_still() {
@@ -312,7 +313,7 @@ void Printer::lift_out(double z) {
   const Point3 found = agreed_position();
   if (std::abs(found.z - target_.z) > kToleranceMm)
     throw PositionError("printer " + link_.port().name() + ": expected the finger lifted to Z" +
-                        format(target_.z, 2) + ", found it at " + describe(found));
+                        format(target_.z, 2) + ", found it at " + describe(found) + "; lift it by hand");
   target_ = found;
   expected_seconds_ = 0;
 }

@@ -6,13 +6,13 @@
 namespace supertac {
 namespace {
 
-constexpr Dim kFeatures = 32;  // channels of the coarsest level
+constexpr Dim kCoarsest = 32;  // channels of the coarsest level
 constexpr Dim kHidden = 64;
 constexpr Dim kDownsampling = 16;
 
 // Channels from level to level; the encoder's first are those of the group.
-constexpr Dim kDown[] = {0, 16, kFeatures, kFeatures, kFeatures};
-constexpr Dim kUp[] = {kFeatures, kFeatures, kFeatures, 16, 16};
+constexpr Dim kDown[] = {0, 16, kCoarsest, kCoarsest, kCoarsest};
+constexpr Dim kUp[] = {kCoarsest, kCoarsest, kCoarsest, 16, 16};
 
 constexpr ConvLayerOptions kHalve{.kernel = 3, .stride = 2, .padding = 1};
 constexpr ConvLayerOptions kDouble{.kernel = 4, .stride = 2, .padding = 1};
@@ -23,7 +23,7 @@ Encoder::Encoder(const VaeOptions& o, Rng& rng)
     : conv_(
           add_each("conv", 4,
                    [&](Dim i) { return Conv1d(i == 0 ? o.channels : kDown[i], kDown[i + 1], kHalve, rng); })),
-      fc_(add("fc", Linear(kFeatures * (o.timesteps / kDownsampling), kHidden, rng))),
+      fc_(add("fc", Linear(kCoarsest * (o.timesteps / kDownsampling), kHidden, rng))),
       mean_(add("mean", Linear(kHidden, o.latent, rng))),
       log_var_(add("log_var", Linear(kHidden, o.latent, rng))) {}
 
@@ -43,7 +43,7 @@ Variable Encoder::mean(const Variable& x) const { return mean_.forward(features(
 Decoder::Decoder(const VaeOptions& o, Rng& rng)
     : coarse_(o.timesteps / kDownsampling),
       widen_(add("fc.0", Linear(o.latent, kHidden, rng))),
-      unfold_(add("fc.1", Linear(kHidden, kFeatures * coarse_, rng))),
+      unfold_(add("fc.1", Linear(kHidden, kCoarsest * coarse_, rng))),
       conv_(add_each("conv", 4, [&](Dim i) { return ConvTranspose1d(kUp[i], kUp[i + 1], kDouble, rng); })),
       out_(add("out", Conv1d(kUp[4], o.channels, kSameSize, rng))) {}
 

@@ -91,7 +91,7 @@ struct Planted : ReverseWatch {
 TEST(OpGradients, APlantedErrorIsFoundAndNamed) {
   std::string last;
   for (const GradientCase& c : op_cases()) {
-    // One case of each op, of more than one number: those have no other index.
+    // One case of each op, of more than one number: a single one has no other index.
     if (c.leaves[0].size() == 1 || std::exchange(last, c.name) == c.name) continue;
     for (std::size_t input = 0; input < c.leaves.size(); ++input) {
       for (const Planted::Kind kind : {Planted::sign, Planted::twice, Planted::index}) {

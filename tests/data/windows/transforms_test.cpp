@@ -30,7 +30,7 @@ TEST(NormaliseWindow, TakesHalfTheRestAndDividesByWhatIsLeft) {
 }
 
 // 100 frames, each of its own bin: six samples lie at or below the rest, three at or above the top.
-TEST(NormaliseWindow, RestAndTopAreTheStatedPercentiles) {
+TEST(NormaliseWindow, RestAndTopAreTheStatedSamples) {
   std::vector<float> x(kTimes * kChannels);
   for (std::size_t t = 0; t < kTimes; ++t) x[t * kChannels] = static_cast<float>(2 * t) * kStep;
   normalise_window(x, kChannels);
@@ -80,7 +80,7 @@ TEST(NormaliseWindow, SaturatedDeadAndShortWindowsStayInRange) {
   }
 }
 
-// It was counted beside the bins.
+// Without care its bin would lie beside all others.
 TEST(NormaliseWindow, NanStaysWhereItIs) {
   std::vector<float> broken(2 * 64);
   for (std::size_t i = 0; i < broken.size(); ++i) broken[i] = static_cast<float>(i) / 128;
