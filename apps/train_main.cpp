@@ -286,8 +286,8 @@ class TrainingRun {
 // Only the first of the ranks writes.
 int run(Arguments& a) {
   return together(a, [&](Ranks& ranks) {
-    as_usage([&] { check_micro_batches(ranks.size(), 8); });
     const Recipe recipe = recipe_of(a);
+    as_usage([&] { check_micro_batches(ranks.size(), static_cast<std::size_t>(recipe.batch)); });
     TrainingTask task = window_task(recipe, a.text("data"), reading_progress(a));
     add_parent("recordings", hash_of_recordings(a.text("data"), recipe.plates));
     return TrainingRun(a, std::move(task), ranks).train();

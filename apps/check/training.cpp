@@ -52,28 +52,33 @@ class Repetition {
       : folder_(run_folder_of(model)),
         ledger_(Ledger::read(LedgerFile::path_in(folder_))),
         task_(task_of(a, model)),
-        trainer_(*task_.windows, task_.split.train, task_.recipe) {}
+        trainer_(*task_.windows, task_.split.train, task_.recipe),
+        end_(task_.recipe.keeps_best && !ledger_.lines.empty() ? ledger_.lines.back().step
+                                                               : trainer_.total_steps()) {}
+
+  /// The training's last step: where it kept the best epoch, it may have ended early.
+  std::int64_t end() const { return end_; }
 
   struct Segment {
     std::int64_t from, to;
   };
   /// From kept state to kept state. Throws FileError when one is missing.
   std::vector<Segment> segments() const {
-    const std::int64_t total = trainer_.total_steps(), apart = LedgerFile::apart(ledger_.every, total);
+    const std::int64_t apart = LedgerFile::apart(ledger_.every, trainer_.total_steps());
     std::vector<Segment> segments;
-    for (std::int64_t from = 0; from < total; from += apart) {
+    for (std::int64_t from = 0; from < end_; from += apart) {
       if (!std::filesystem::exists(LedgerFile::state_path(folder_, from)))
         throw FileError(LedgerFile::state_path(folder_, from),
                         "is missing; the ledger says that it was kept");
-      segments.push_back({from, std::min(from + apart, total)});
+      segments.push_back({from, std::min(from + apart, end_)});
     }
     return segments;
   }
 
   /// Goes to the last kept state at or before `step`; what it returns is how the state differs from its line.
   std::optional<LedgerDifference> start(std::int64_t step) {
-    const std::int64_t total = trainer_.total_steps(), apart = LedgerFile::apart(ledger_.every, total);
-    const std::int64_t kept = step == total ? total : step / apart * apart;
+    const std::int64_t apart = LedgerFile::apart(ledger_.every, trainer_.total_steps());
+    const std::int64_t kept = step == end_ ? end_ : step / apart * apart;
     trainer_.restore(LedgerFile::state_path(folder_, kept), task_.origin);
     const std::optional<LedgerLine> line = ledger_.at(kept);
     writer_.emplace(trainer_, ledger_.every, line ? &*line : nullptr);
@@ -93,6 +98,7 @@ class Repetition {
     } else {
       trainer_.train_step();
     }
+    if (trainer_.step() % trainer_.steps_per_epoch() == 0) end_epoch(trainer_, task_);
     line_ = writer_->after_step();
     if (!line_) return std::nullopt;
     const std::optional<LedgerLine> theirs = ledger_.at(line_->step);
@@ -119,6 +125,7 @@ class Repetition {
   Ledger ledger_;
   TrainingTask task_;
   Trainer trainer_;
+  std::int64_t end_;
   std::optional<LedgerWriter> writer_;
   std::optional<LedgerLine> line_;
 };
@@ -149,7 +156,7 @@ std::vector<Segment> drawn(std::vector<Segment> segments, std::size_t count, std
   return segments;
 }
 
-// The model file has to hold the parameters of the last state.
+// The model file has to hold the parameters of the last state, or of its best epoch.
 bool is_of(const std::string& model, const SuperTac& network) {
   const ModelFile file = load_model(model);
   const auto& a = network.parameters();
@@ -181,7 +188,9 @@ int check_training(const Arguments& a) {
   for (const Segment& s : chosen)
     say("steps " + std::to_string(s.from) + " to " + std::to_string(s.to) + ": ", training.repeat(s, a),
         {{"from", s.from}, {"to", s.to}});
-  auto last = training.start(trainer.total_steps());
+  auto last = training.start(training.end());
+  if (!last && !trainer.done()) last = LedgerDifference{trainer.step(), trainer.step(), "the end", false};
+  trainer.use_best();
   if (!last && !is_of(model, trainer.model()))
     last = LedgerDifference{trainer.step(), trainer.step(), "the model's file", false};
   say("the model against the last state: ", last, {{"model", model}});
@@ -219,7 +228,7 @@ int check_step(const Arguments& a) {
   const std::string model = a.text("FILE");
   Repetition training(a, model);
   Trainer& trainer = training.trainer();
-  const std::int64_t step = a.integer("step", 1, trainer.total_steps());
+  const std::int64_t step = a.integer("step", 1, training.end());
   auto d = training.repeat({step - 1, step - 1}, a);
   OpenedStep opened;
   if (!d) {

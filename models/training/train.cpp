@@ -169,6 +169,10 @@ TrainingTask window_task(const Recipe& given, const std::string& recordings, con
   return task;
 }
 
+void end_epoch(Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop) {
+  if (!task.held_out.empty()) trainer.epoch_scored(scores_of(trainer, task.held_out, stop).ssim);
+}
+
 bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks) {
   const auto begin = std::chrono::steady_clock::now();
   const auto save = [&] {  // of several processes all take part, though the first alone has a file
@@ -182,8 +186,9 @@ bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& 
     sums.add(report);
     sums.gradient_norm += report.gradient_norm;
     ++steps;
-    if (callbacks.step) callbacks.step(report);
     const bool epoch_ends = report.step % trainer.steps_per_epoch() == 0;
+    if (epoch_ends) end_epoch(trainer, task, callbacks.stop);
+    if (callbacks.step) callbacks.step(report);
     if (callbacks.log && (epoch_ends || report.step % kStepsPerLine == 0)) {
       for (double* sum : sums.all()) *sum /= static_cast<double>(steps);
       sums.gradient_norm /= static_cast<double>(steps);
@@ -197,8 +202,6 @@ bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& 
       callbacks.log(std::exchange(sums, {}));
       steps = 0;
     }
-    if (epoch_ends && !task.held_out.empty())
-      trainer.epoch_scored(scores_of(trainer, task.held_out, callbacks.stop).ssim);
     if (report.step % callbacks.checkpoint_every == 0) save();
     stop = report.stop || (callbacks.stop && trainer.ranks() == 1 && callbacks.stop());
   }

@@ -52,7 +52,7 @@ struct LogLine : LossTerms {
 
 struct TrainingCallbacks {
   std::function<bool()> stop = {};  ///< asked during and after every step: whether to end early
-  std::function<void(const StepReport& report)> step = {};  ///< after every step
+  std::function<void(const StepReport& report)> step = {};  ///< after every step, and end_epoch()
   /// Every 50 steps and at the end of every epoch.
   std::function<void(const LogLine& line)> log = {};
   /// Where the state is saved, every so many steps and at the end; "": nowhere.
@@ -60,6 +60,10 @@ struct TrainingCallbacks {
   std::int64_t checkpoint_every = 500;
   double seconds_before = 0;  ///< on the log's clock when this process began
 };
+
+/// Behind the last step of an epoch: scores the windows that are held out, where there are any, for
+/// Trainer::epoch_scored(). `stop` ends the scoring early.
+void end_epoch(Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop = {});
 
 /// Trains until Trainer::done(), or to the end of the step in which `stop` returns true; returns whether all
 /// steps are done. Throws as Trainer::train_step and Trainer::save.

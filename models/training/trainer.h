@@ -80,6 +80,8 @@ class Trainer {
   void epoch_scored(double score);
   /// Sets the parameters to those of the best epoch, where any was scored.
   void use_best();
+  /// Of the best epoch, in the order of the parameters; empty until one was scored.
+  const std::vector<Tensor>& best() const { return best_; }
   std::int64_t best_epoch() const { return best_epoch_; }  ///< from 1; 0: none was scored
   double best_score() const { return best_score_; }
   const Recipe& recipe() const { return recipe_; }
@@ -102,8 +104,7 @@ class Trainer {
   std::span<const std::uint32_t> last_windows() const { return indices_; }
   /// Those of any step, from 0.
   void windows_of_step(std::int64_t step, std::span<std::uint32_t> out) const;
-  /// Every array of the state: the parameters, then Adam's first and second moments, named as in a
-  /// checkpoint.
+  /// The parameters, then the two moments of each in turn, named as in a checkpoint.
   void for_each_tensor(const std::function<void(const std::string&, const Tensor&)>& visit) const;
 
   /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Of several

@@ -82,9 +82,18 @@ std::optional<LedgerLine> Ledger::at(std::int64_t step) const {
   return LedgerLine::of(found->text);
 }
 
+static void for_each_of_state(const Trainer& trainer,
+                              const std::function<void(const std::string&, const Tensor&)>& visit) {
+  trainer.for_each_tensor(visit);
+  if (!trainer.recipe().keeps_best) return;
+  const std::vector<Parameter>& parameters = trainer.model().parameters();
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    visit("optimizer.best." + parameters[i].name, trainer.best().empty() ? Tensor() : trainer.best()[i]);
+}
+
 std::vector<std::string> hashes_of(const Trainer& trainer) {
   std::vector<std::string> hashes;
-  trainer.for_each_tensor([&](const std::string&, const Tensor& values) {
+  for_each_of_state(trainer, [&](const std::string&, const Tensor& values) {
     Sha256 hash;
     hash.add(std::as_bytes(values.values()));
     hashes.push_back(hash.hex());
@@ -95,7 +104,7 @@ std::vector<std::string> hashes_of(const Trainer& trainer) {
 LedgerWriter::LedgerWriter(const Trainer& trainer, std::int64_t every, const LedgerLine* previous)
     : trainer_(trainer), every_(every) {
   std::vector<std::string> names;
-  trainer.for_each_tensor([&](const std::string& name, const Tensor&) { names.push_back(name); });
+  for_each_of_state(trainer, [&](const std::string& name, const Tensor&) { names.push_back(name); });
   header_ = Json{{"format", kFormat}, {"every", every}, {"tensors", names}}.dump();
   chain_ = previous != nullptr ? previous->chain : sha256(header_);
   // Batches between that line and a state that lies behind it.

@@ -16,9 +16,11 @@ namespace supertac {
 
 struct LedgerLine {
   std::int64_t step = 0;
-  std::string batches;               ///< of the indices of every batch since the line before
-  std::vector<std::string> tensors;  ///< of each parameter and of Adam's moments, in the order of the header
-  std::string chain;                 ///< over all that stands here and the chain before
+  std::string batches;  ///< of the indices of every batch since the line before
+  /// Of each parameter, of Adam's moments, and where the recipe keeps it of the best epoch's parameters, in
+  /// the order of the header.
+  std::vector<std::string> tensors;
+  std::string chain;  ///< over all that stands here and the chain before
 
   /// Of a line of the file. Throws std::runtime_error when it is none.
   static LedgerLine of(const std::string& text);

@@ -1,6 +1,7 @@
 // Single frames with measured truths, from a file of pairs: imported, trained on, scored, streamed, told
 // apart.
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "data/recordings/recording.h"
 #include "io/files/safetensors.h"
@@ -74,6 +75,20 @@ TEST_F(Frames, SameBytesForAnyThreadsAndAfterAPause) {
   EXPECT_EQ(bytes("1.safetensors"), bytes("3.safetensors"));
   succeed("supertac-train --data data --recipe-of 1.safetensors --out 4.safetensors");
   EXPECT_EQ(json("1.run/settings.json")["content"], json("4.run/settings.json")["content"]);
+}
+
+// Five epochs that are no better end a training, whose model is the network before them.
+TEST_F(Frames, ATrainingThatKeepsItsBestEpochIsRepeated) {
+  const std::string kept = train("m.safetensors", "--epochs 90 --learning-rate 0.03 --ledger 4").error;
+  EXPECT_TRUE(std::regex_search(kept, std::regex("the network of epoch [0-9]+ of [1-8]?[0-9] is kept")))
+      << kept;
+  const std::string audit = "supertac-check training m.safetensors --data data --segments 1000";
+  succeed(audit);
+  std::filesystem::copy(path("m.run/last.safetensors"), path("m.safetensors"),
+                        std::filesystem::copy_options::overwrite_existing);
+  const ProcessResult other = run(audit);
+  EXPECT_EQ(other.code, 1);
+  EXPECT_TRUE(contains(other.out, "the model's file")) << other.out;
 }
 
 // Other groups, another factor; a stated one is kept.
