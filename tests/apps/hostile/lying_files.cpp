@@ -35,6 +35,11 @@ double evil_number(const RandomStream& random, std::uint64_t at) {
   return kEvilNumbers[random.bits(at) % std::size(kEvilNumbers)];
 }
 
+// Any element of a container.
+auto one_of(auto& all, std::uint32_t bits) {
+  return std::next(all.begin(), static_cast<std::ptrdiff_t>(bits % all.size()));
+}
+
 // Some values of one tensor, or all.
 template <class Number>
 void lie_in(Bytes& bytes, const RandomStream& random) {
@@ -51,9 +56,7 @@ void lie_in(Bytes& bytes, const RandomStream& random) {
 
 void lie_in_json(nlohmann::ordered_json& value, const RandomStream& random) {
   if (value.is_structured() && !value.empty() && random.bits(12) % 2 == 0) {
-    auto part = value.begin();
-    std::advance(part, static_cast<std::ptrdiff_t>(random.bits(13) % value.size()));
-    value = *part;
+    value = *one_of(value, random.bits(13));
   } else if (random.bits(14) % 3 == 0) {
     value = evil_value(random, 15);
   } else if (random.bits(14) % 3 == 1) {
@@ -68,9 +71,7 @@ void lie_in_text(std::string& text, const RandomStream& random) {
   try {
     auto json = nlohmann::ordered_json::parse(text);
     if (json.is_object() && !json.empty()) {
-      auto value = json.begin();
-      std::advance(value, static_cast<std::ptrdiff_t>(random.bits(10) % json.size()));
-      lie_in_json(*value, random);
+      lie_in_json(*one_of(json, random.bits(10)), random);
       text = json.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
       return;
     }
@@ -84,9 +85,7 @@ void lie_in_file(TensorFile& file, const RandomStream& random) {
   TensorFile::Entry& tensor = file.tensors[random.bits(0) % file.tensors.size()];
   const std::uint32_t what = random.bits(1) % 8;
   if (what < 3 && !file.metadata.empty()) {
-    auto entry = file.metadata.begin();
-    std::advance(entry, static_cast<std::ptrdiff_t>(random.bits(2) % file.metadata.size()));
-    lie_in_text(entry->second, random);
+    lie_in_text(one_of(file.metadata, random.bits(2))->second, random);
   } else if (what < 6) {
     tensor.dtype == "F64" ? lie_in<double>(tensor.bytes, random) : lie_in<float>(tensor.bytes, random);
   } else if (what == 6 && !tensor.shape.empty() && tensor.shape[0] > 0) {
@@ -109,7 +108,7 @@ void expect_typed(const std::function<void()>& use) {
   }
 }
 
-void use_recording(const std::string& path) {
+void use_recording(const std::string& path, const RandomStream&) {
   WindowSet windows({.timesteps = 32, .scale = 2});
   windows.add(read_recording(path));
   if (windows.size() == 0) return;
@@ -121,12 +120,12 @@ void use_recording(const std::string& path) {
   }
 }
 
-void use_model(const std::string& path) {
+void use_model(const std::string& path, const RandomStream&) {
   const ModelFile file = load_model(path);
   (void)CompiledModel(*file.model).estimate(Tensor::full(file.model->input_shape(1), 0.5F));
 }
 
-void use_pairs(const std::string& path) {
+void use_pairs(const std::string& path, const RandomStream&) {
   WindowSet frames({.timesteps = 1});
   for (const Recording& recording : import_pairs(SafetensorsFile::read(path))) frames.add(recording);
   std::vector<std::uint32_t> all(frames.size());
@@ -134,15 +133,14 @@ void use_pairs(const std::string& path) {
   (void)fit_baselines(frames, all);
 }
 
-void use_sensor(const RandomStream& random) {
+void use_sensor(const std::string&, const RandomStream& random) {
   nlohmann::ordered_json json = nlohmann::ordered_json::parse(
       R"({"name":"mat","rows":3,"columns":4,"pitch_mm":[5,5],"channels":1,"unit":"counts","pressed":"higher",
           "range":[40,900],"rate_hz":100,"port":"udp::5005","order":[0,1,2,3,4,5,6,7,8,9,10,11],"dead":[3],
           "rest":[1,2,3,4,5,6,7,8,9,10,11,12],"gain":[1,1,1,1,1,1,2,2,2,2,2,2],"follow_rest_s":5,
           "frame":{"kind":"binary","header":"AA55","type":"u16","endian":"big","checksum":"sum8",
                    "time":{"type":"u32","unit":"ms"}}})");
-  auto value = json.begin();
-  std::advance(value, static_cast<std::ptrdiff_t>(random.bits(0) % json.size()));
+  const auto value = one_of(json, random.bits(0));
   auto& part =
       value->is_object() && random.bits(1) % 4 != 0
           ? (*value)[std::array{"kind", "header", "type", "endian", "checksum", "time"}[random.bits(2) % 6]]
@@ -217,33 +215,30 @@ Counts lying_files(const std::string& folder, std::uint64_t n, std::uint64_t see
                         pairs = SafetensorsFile::read(folder + "/pairs");
   struct Kind {
     const char* name;
-    const SafetensorsFile* good;
-    std::function<void(const std::string&)> use;
+    void (*use)(const std::string& path, const RandomStream&);
+    const SafetensorsFile* good = nullptr;  ///< of files whose lies are written before they are used
   };
-  const Kind kinds[] = {
-      {"recording", &recording, use_recording}, {"model", &model, use_model}, {"pairs", &pairs, use_pairs}};
+  const Kind kinds[] = {{"recording", use_recording, &recording},
+                        {"model", use_model, &model},
+                        {"pairs", use_pairs, &pairs},
+                        {"sensor", use_sensor},
+                        {"journal", use_journal}};
   const std::string path = folder + "/lie";
   for (std::uint64_t i = 0; i < n; ++i, ++counts["lying files"]) {
     const RandomStream random(seed, i);
-    const std::uint64_t which = i % (std::size(kinds) + 2);
-    const std::string what = "lying file " + std::to_string(i) + ", ";
-    if (which == std::size(kinds)) {
-      judge_reading(
-          what + "sensor", [&] { expect_typed([&] { use_sensor(random); }); }, counts);
-    } else if (which > std::size(kinds)) {
-      judge_reading(
-          what + "journal", [&] { expect_typed([&] { use_journal(path, random); }); }, counts);
-    } else {
-      TensorFile file(*kinds[which].good);
-      lie_in_file(file, random);
-      try {
+    const Kind& kind = kinds[i % std::size(kinds)];
+    try {
+      if (kind.good != nullptr) {
+        TensorFile file(*kind.good);
+        lie_in_file(file, random);
         file.write(path);
-      } catch (const std::invalid_argument&) {  // no such file can be written
-        continue;
       }
-      judge_reading(
-          what + kinds[which].name, [&] { expect_typed([&] { kinds[which].use(path); }); }, counts);
+    } catch (const std::invalid_argument&) {  // no such file can be written
+      continue;
     }
+    judge_reading(
+        "lying file " + std::to_string(i) + ", " + kind.name,
+        [&] { expect_typed([&] { kind.use(path, random); }); }, counts);
   }
   return counts;
 }

@@ -119,13 +119,12 @@ void judge_reading(const std::string& what, const std::function<void()>& read, C
 namespace {
 
 std::vector<Reader> readers(const std::string& folder) {
-  const std::string file = folder + "/mutant";
   std::string lines;
   for (int i = 0; i < 20; ++i)
     lines += "2.40 2.41 2.42 2.43 2.44 2.45 2.40 2.41 2.42 2.43 2.44 2.45 2.40 2.41 2.42 2.43\n";
   const Bytes recording = good_recording(folder);
-  const auto from_file = [file](auto read) {
-    return [file, read](const Bytes& bytes) {
+  const auto from_file = [folder](auto read, const std::string& name = "/mutant") {
+    return [file = folder + name, read](const Bytes& bytes) {
       // Not write_file(): a million syncs.
       std::ofstream(file, std::ios::binary)
           .write(reinterpret_cast<const char*>(bytes.data()), std::ssize(bytes));
@@ -135,50 +134,45 @@ std::vector<Reader> readers(const std::string& folder) {
   Bytes frames(4 * rig::kFrameBytes);
   for (int i = 0; i < 4; ++i)
     write_frame({}, std::span(frames).subspan(i * rig::kFrameBytes).first<rig::kFrameBytes>());
-  return {
-      {"journal", good_journal(folder + "/journal"), [](const Bytes& b) { check_journal(b); }},
-      {"sensor's journal",
-       good_journal(folder + "/of_sensor",
-                    ",\"sensor\":" + json_of(Sensor{}).dump() + ",\"bed\":" + json_of(Bed{}).dump()),
-       [](const Bytes& b) { check_journal(b); }},
-      {"stl", stl_bytes(mesh_of(Plate::named("plain")), "x"), [](const Bytes& b) { check_stl(b); }},
-      {"safetensors", recording, from_file([](const std::string& f) { (void)SafetensorsFile::read(f); })},
-      {"recording", recording, from_file([](const std::string& f) { (void)read_recording(f); })},
-      {"text", bytes_of(lines), from_file([](const std::string& f) {
-         std::size_t dropped = 0;
-         (void)import_text_pass(f, dropped);
-       })},
-      {"table", bytes_of("ms,a,b,\"c\"\n# a remark\n0,1,2,3\n10,+1,2,3\n20,1,nan,3\n"),
-       from_file([](const std::string& f) { (void)read_table(f); })},
-      {"array", bytes_of(numpy_file()),
-       [folder](const Bytes& b) {
-         const std::string name = folder + "/mutant.npy";
-         std::ofstream(name, std::ios::binary).write(reinterpret_cast<const char*>(b.data()), std::ssize(b));
-         (void)read_table(name);
-       }},
-      {"json", bytes_of(R"({"a":[1,2,{"b":"c"}],"d":1e5,"e":null})"),
-       [](const Bytes& b) { (void)parse_json_limited(text_of(b)); }},
-      {"reply", bytes_of("X:99.70 Y:101.17 Z:91.81 E:0.00 Count X:1 Y:2 Z:3"),
-       [](const Bytes& b) { (void)parse_reply(text_of(b)); }},
-      {"frames", frames,
-       [](const Bytes& b) {
-         BoardDecoder decoder;
-         decoder.push(b, [](const DecodedFrame&) {});
-       }},
-      {"plate", bytes_of("bumps12+ridges6h1.5"),
-       [](const Bytes& b) {
-         const std::string name(text_of(b));
-         if (!Plate::is_file(name)) (void)Plate::named(name);
-       }},
-      {"model", good_model(folder), from_file([](const std::string& f) {
-         try {
-           (void)load_model(f);
-         } catch (const std::runtime_error& error) {
-           if (!std::string(error.what()).starts_with(f)) throw;  // it names the file, else it is raw
-         }
-       })},
-      {"pairs", good_pairs(folder),
-       from_file([](const std::string& f) { (void)import_pairs(SafetensorsFile::read(f)); })}};
+  return {{"journal", good_journal(folder + "/journal"), [](const Bytes& b) { check_journal(b); }},
+          {"sensor's journal",
+           good_journal(folder + "/of_sensor",
+                        ",\"sensor\":" + json_of(Sensor{}).dump() + ",\"bed\":" + json_of(Bed{}).dump()),
+           [](const Bytes& b) { check_journal(b); }},
+          {"stl", stl_bytes(mesh_of(Plate::named("plain")), "x"), [](const Bytes& b) { check_stl(b); }},
+          {"safetensors", recording, from_file([](const std::string& f) { (void)SafetensorsFile::read(f); })},
+          {"recording", recording, from_file([](const std::string& f) { (void)read_recording(f); })},
+          {"text", bytes_of(lines), from_file([](const std::string& f) {
+             std::size_t dropped = 0;
+             (void)import_text_pass(f, dropped);
+           })},
+          {"table", bytes_of("ms,a,b,\"c\"\n# a remark\n0,1,2,3\n10,+1,2,3\n20,1,nan,3\n"),
+           from_file([](const std::string& f) { (void)read_table(f); })},
+          {"array", bytes_of(numpy_file()),
+           from_file([](const std::string& f) { (void)read_table(f); }, "/mutant.npy")},
+          {"json", bytes_of(R"({"a":[1,2,{"b":"c"}],"d":1e5,"e":null})"),
+           [](const Bytes& b) { (void)parse_json_limited(text_of(b)); }},
+          {"reply", bytes_of("X:99.70 Y:101.17 Z:91.81 E:0.00 Count X:1 Y:2 Z:3"),
+           [](const Bytes& b) { (void)parse_reply(text_of(b)); }},
+          {"frames", frames,
+           [](const Bytes& b) {
+             BoardDecoder decoder;
+             decoder.push(b, [](const DecodedFrame&) {});
+           }},
+          {"plate", bytes_of("bumps12+ridges6h1.5"),
+           [](const Bytes& b) {
+             const std::string name(text_of(b));
+             if (!Plate::is_file(name)) (void)Plate::named(name);
+           }},
+          {"model", good_model(folder), from_file([](const std::string& f) {
+             try {
+               (void)load_model(f);
+             } catch (const std::runtime_error& error) {
+               if (!std::string(error.what()).starts_with(f)) throw;  // it names the file, else it is raw
+             }
+           })},
+          {"pairs", good_pairs(folder),
+           from_file([](const std::string& f) { (void)import_pairs(SafetensorsFile::read(f)); })}};
 }
 
 Bytes mutant_of(const Bytes& good, const RandomStream& random) {
