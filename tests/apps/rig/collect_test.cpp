@@ -1,12 +1,10 @@
 // supertac-collect as a process on a virtual rig: how it ends, what it says, where the finger is left.
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <csignal>
 #include <fstream>
 
 #include "hardware/collection/collection.h"
-#include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 #include "tests/apps/common/expect.h"
 #include "tests/apps/rig/collect_run.h"

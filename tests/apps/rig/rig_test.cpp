@@ -1,7 +1,6 @@
 // supertac-rig, supertac-collect, supertac-import --journal and supertac-plate together, as on a table.
 #include <unistd.h>
 
-#include <csignal>
 #include <nlohmann/json.hpp>
 
 #include "data/windows/windows.h"

@@ -10,7 +10,6 @@
 #include "apps/stream/views/web_view.h"
 #include "apps/web/pages.h"
 #include "apps/web/web_server.h"
-#include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/images/images.h"
 #include "tests/apps/common/expect.h"

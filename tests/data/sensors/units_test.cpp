@@ -4,7 +4,6 @@
 #include "data/simulation/simulator.h"
 #include "data/windows/random_passes.h"
 #include "data/windows/windows.h"
-#include "io/files/file.h"
 #include "tests/support/test.h"
 
 namespace supertac::units_test {
