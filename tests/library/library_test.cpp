@@ -8,12 +8,12 @@
 #include "data/windows/transforms.h"
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
-#include "io/numbers/random.h"
 #include "models/files/model_file.h"
 #include "models/inference/compiled/compiled_model.h"
 #include "models/training/train.h"
 #include "tests/data/test_recordings.h"
 #include "tests/models/support.h"
+#include "tests/support/draws.h"
 #include "tests/support/test.h"
 
 namespace supertac::library_test {
@@ -139,13 +139,12 @@ TEST_F(Library, MapsAsTheCppLibraryDoes) {
   supertac_map* map = supertac_map_new(model);
   ASSERT_NE(map, nullptr);
   SurfaceMap expected(file_.array().picture(4));
-  const RandomStream random(3, 5);
+  Draws draw(3, 5);
   std::vector<float> picture(256), errors(256);
-  for (std::uint64_t k = 0; k < 40; ++k) {
-    for (std::size_t p = 0; p < 256; ++p)
-      picture[p] = static_cast<float>(random.uniform(512 * k + p)),
-      errors[p] = static_cast<float>(random.uniform(512 * k + 256 + p));
-    const double y = 0.3 * static_cast<double>(k);
+  for (int k = 0; k < 40; ++k) {
+    for (std::vector<float>* drawn : {&picture, &errors})
+      for (float& v : *drawn) v = static_cast<float>(draw());
+    const double y = 0.3 * k;
     expected.add(-4, y, picture, errors);
     ASSERT_EQ(supertac_map_add(map, -4, y, picture.data(), errors.data()), 0);
   }
@@ -315,8 +314,7 @@ TEST_F(Library, SaysWhatWasWrongToTheThreadThatAsked) {
 // Flipped, cut and doubled bytes, checksum mended by leaving it out: an error or a model that draws. The full
 // run is SUPERTAC_FUZZ_RUNS=10000.
 TEST_F(Library, TakesAnyBytesAndAnyCalls) {
-  const char* const wanted = std::getenv("SUPERTAC_FUZZ_RUNS");
-  const int runs = wanted == nullptr ? 300 : std::atoi(wanted);
+  const std::uint64_t runs = number_of("SUPERTAC_FUZZ_RUNS", 300);
   std::vector<std::byte> bytes = read_file(path_, 1 << 26);
   // A file without our two fields is another program's: only so do changes get behind the checksum.
   std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -326,20 +324,15 @@ TEST_F(Library, TakesAnyBytesAndAnyCalls) {
     text[at + 1] = 'X';
   }
   const std::size_t header = text.find("}}") + 64;
-  const RandomStream stream(17, 1);
-  std::uint64_t drawn = 0;
-  const auto unit = [&] { return stream.uniform(drawn++); };
-  int opened = 0;
-  for (int run = 0; run < runs; ++run) {
+  Draws draw(17, 1);
+  std::uint64_t opened = 0;
+  for (std::uint64_t run = 0; run < runs; ++run) {
     std::string changed = text;
-    const auto random = [&](std::size_t below) {
-      return static_cast<std::size_t>(unit() * static_cast<double>(below));
-    };
-    for (std::size_t flips = 1 + random(4); flips > 0; --flips)
-      changed[random(random(2) == 0 ? std::min(header, changed.size()) : changed.size())] =
-          static_cast<char>(random(256));
-    if (random(8) == 0) changed.resize(random(changed.size()));
-    const int precision = static_cast<int>(random(2));
+    for (std::size_t flips = 1 + draw.below(4); flips > 0; --flips)
+      changed[draw.below(draw.below(2) == 0 ? std::min(header, changed.size()) : changed.size())] =
+          static_cast<char>(draw.below(256));
+    if (draw.below(8) == 0) changed.resize(draw.below(changed.size()));
+    const int precision = static_cast<int>(draw.below(2));
     const Model model(supertac_open_memory(changed.data(), changed.size(), precision));
     if (model == nullptr) {
       EXPECT_STRNE(supertac_error(), "");
@@ -351,11 +344,12 @@ TEST_F(Library, TakesAnyBytesAndAnyCalls) {
     ASSERT_EQ(supertac_describe(model.get(), &about), 0);
     std::vector<float> window(static_cast<std::size_t>(about.timesteps * about.signals), 0.3F),
         picture(static_cast<std::size_t>(about.height * about.width));
-    supertac_draw(model.get(), 1, window.data(), picture.data(), nullptr, 1 + static_cast<int>(random(2)));
-    const Live live(supertac_live_new(model.get(), 1 + 1000 * unit(), random(2) == 0 ? 0 : 0.1));
+    supertac_draw(model.get(), 1, window.data(), picture.data(), nullptr,
+                  1 + static_cast<int>(draw.below(2)));
+    const Live live(supertac_live_new(model.get(), 1 + 1000 * draw(), draw.below(2) == 0 ? 0 : 0.1));
     for (int i = 0; live != nullptr && i < 20; ++i) {
-      window[random(window.size())] = random(5) == 0 ? NAN : 2.0F;
-      supertac_live_push(live.get(), unit() * 3, window.data());
+      window[draw.below(window.size())] = draw.below(5) == 0 ? NAN : 2.0F;
+      supertac_live_push(live.get(), draw() * 3, window.data());
       supertac_live_picture(live.get(), picture.data(), nullptr);
     }
   }

@@ -10,15 +10,15 @@
 #include "io/files/file.h"
 #include "models/training/train.h"
 #include "tests/data/test_recordings.h"
+#include "tests/support/draws.h"
 #include "tests/support/test.h"
 
 namespace supertac {
 
 inline Tensor uniform(const Shape& shape, std::uint64_t seed) {
   Tensor t(shape);
-  const RandomStream random(seed, 1);
-  std::uint64_t i = 0;
-  for (real& x : t.values()) x = static_cast<real>(random.uniform(i++));
+  Draws draw(seed, 1);
+  for (real& x : t.values()) x = static_cast<real>(draw());
   return t;
 }
 
@@ -27,11 +27,10 @@ inline constexpr Dim kGroups = 4;
 
 inline std::array<Tensor, kGroups> normal_eps(Dim n, Dim latent, std::uint64_t seed) {
   std::array<Tensor, kGroups> eps;
-  const RandomStream random(seed, 2);
-  std::uint64_t i = 0;
+  Draws draw(seed, 2);
   for (Tensor& e : eps) {
     e = Tensor(Shape{n, latent});
-    for (real& x : e.values()) x = static_cast<real>(random.normal(i++));
+    for (real& x : e.values()) x = static_cast<real>(draw.normal());
   }
   return eps;
 }

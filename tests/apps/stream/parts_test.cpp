@@ -14,8 +14,8 @@
 #include "apps/stream/pressed_order.h"
 #include "apps/stream/views/for_programs.h"
 #include "io/files/json.h"
-#include "io/numbers/random.h"
 #include "tests/apps/common/expect.h"
+#include "tests/support/draws.h"
 #include "tests/support/test.h"
 
 namespace supertac::parts_test {
@@ -218,15 +218,12 @@ TEST_F(RecorderTest, AFolderThatIsGoneIsSaid) {
 TEST(PressedOrder, IsTheWiringWhateverIsFeltBesides) {
   const TemporaryFolder folder;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
-    const RandomStream random(seed, 57);
-    std::uint64_t next = 0;
+    Draws draw(seed, 57);
     Sensor draft{.array = {.rows = 3, .columns = 5, .channels = 1}, .frame = {.kind = FrameKind::text}};
     const auto shuffled = [&] {
       std::vector<int> order(15);
       std::iota(order.begin(), order.end(), 0);
-      for (std::size_t k = 14; k > 0; --k)
-        std::swap(order[k],
-                  order[static_cast<std::size_t>(random.uniform(next++) * static_cast<double>(k + 1))]);
+      for (std::size_t k = 14; k > 0; --k) std::swap(order[k], order[draw.below(k + 1)]);
       return order;
     };
     // As the draft has it, and as it is: at its place 4 nothing answers.
@@ -249,7 +246,7 @@ TEST(PressedOrder, IsTheWiringWhateverIsFeltBesides) {
         for (std::size_t t = 0; t < 15; ++t) {
           const int at = draft.order.empty() ? static_cast<int>(t) : draft.order[t];
           const auto of = static_cast<std::size_t>(std::ranges::find(wiring, at) - wiring.begin());
-          loads[t] = std::abs(felt[of] + 0.002 * random.normal(next++));
+          loads[t] = std::abs(felt[of] + 0.002 * draw.normal());
         }
         order.push(loads);
       }
@@ -261,7 +258,7 @@ TEST(PressedOrder, IsTheWiringWhateverIsFeltBesides) {
       if (place == 4)
         (void)order.skip();
       else
-        press(place, 0.05 + 0.2 * random.uniform(next++));
+        press(place, 0.05 + 0.2 * draw());
     }
     ASSERT_FALSE(order.status().asked);
     const Sensor found = read_sensor(path);

@@ -26,17 +26,14 @@ ModelFile onnx_model_of(const std::string& preset, const TaxelArray& array, Grou
 // Fingers that press, each window as hard and as long as chance will have it; some are pressed all the time.
 Tensor volts_of(const SuperTac& network, Dim count) {
   Tensor volts(network.input_shape(count));
-  const RandomStream random(11, 3);
+  Draws draw(11, 3);
   const Dim frames = volts.dim(1), signals = volts.dim(2);
-  std::uint64_t next = 0;
   for (Dim n = 0; n < count; ++n) {
     for (Dim k = 0; k < signals; ++k) {
-      const double rest = 0.1 * random.uniform(next++), depth = 0.4 * random.uniform(next++);
-      const double phase = 6 * random.uniform(next++), speed = 0.1 * random.uniform(next++);
+      const double rest = 0.1 * draw(), depth = 0.4 * draw(), phase = 6 * draw(), speed = 0.1 * draw();
       for (Dim t = 0; t < frames; ++t) {
         const double press = rest + depth * std::max(0.0, std::sin(phase + speed * static_cast<double>(t)));
-        const double noise = 0.01 * random.normal(next++);
-        volts.data()[(n * frames + t) * signals + k] = static_cast<real>(2.45 - press + noise);
+        volts.data()[(n * frames + t) * signals + k] = static_cast<real>(2.45 - press + 0.01 * draw.normal());
       }
     }
   }

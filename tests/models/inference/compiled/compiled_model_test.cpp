@@ -4,7 +4,6 @@
 
 #include "autograd/kernels/fast/isa/isa.h"
 #include "io/files/safetensors.h"
-#include "io/numbers/random.h"
 #include "tests/allocations.h"
 #include "tests/models/support.h"
 #include "tests/support/test.h"
@@ -36,23 +35,19 @@ void expect_same_estimate(const SuperTac& network, Dim count, const std::string&
 }
 
 SuperTacSettings random_settings(std::uint64_t seed) {
-  const RandomStream random(seed, 0);
-  std::uint64_t at = 0;
-  const auto one_of = [&](std::vector<Dim> values) {
-    return values[static_cast<std::size_t>(random.uniform(at++) * static_cast<double>(values.size()))];
-  };
+  Draws draw(seed, 0);
   SuperTacSettings s;
-  s.rows = one_of({2, 3, 4, 5, 8});
-  s.columns = one_of({4, 5, 6, 10});
-  s.in_channels = one_of({1, 1, 2, 3});
-  s.timesteps = one_of({32, 48, 64});
-  s.latent = one_of({1, 3, 10});
-  s.scale = one_of({4, 4, 8});
-  s.channels = one_of({4, 8, 12, 16, 20, 32});
-  s.rcabs = one_of({0, 1, 2});
-  s.grouping = one_of({0, 1}) == 0 ? Grouping::horizontal : Grouping::vertical;
-  s.predicted_error = one_of({0, 1}) == 0;
-  s.last_frame_path = one_of({0, 1}) == 0;
+  s.rows = draw.of({2, 3, 4, 5, 8});
+  s.columns = draw.of({4, 5, 6, 10});
+  s.in_channels = draw.of({1, 1, 2, 3});
+  s.timesteps = draw.of({32, 48, 64});
+  s.latent = draw.of({1, 3, 10});
+  s.scale = draw.of({4, 4, 8});
+  s.channels = draw.of({4, 8, 12, 16, 20, 32});
+  s.rcabs = draw.of({0, 1, 2});
+  s.grouping = draw.of({Grouping::horizontal, Grouping::vertical});
+  s.predicted_error = draw.of({true, false});
+  s.last_frame_path = draw.of({true, false});
   return s;
 }
 
