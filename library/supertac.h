@@ -10,8 +10,7 @@
    Link with `pkg-config --cflags --libs supertac`, or find_package(supertac) and supertac::c. Functions that
    can fail return NULL or -1, and supertac_error() then says in one line what was wrong. Nothing is printed,
    and no exception leaves the library. In a child by fork() the thread that forked works alone.
-   The pictures have the same bits as those of the programs, on every
-   processor and with any number of threads. */
+   The pictures have the same bits as those of the programs, on every processor and with any number of threads. */
 #ifndef SUPERTAC_H
 #define SUPERTAC_H
 

@@ -13,7 +13,7 @@ namespace supertac {
 struct GradientCase {
   std::string kind;  ///< "op", "layer" or "loss"
   std::string name;  ///< of an op the name that it records: "conv2d"
-  /// Of these leaves; that of an op takes others as well.
+  /// Called with these leaves; an op's also with others of the same kind.
   std::function<Variable(const std::vector<Variable>&)> f;
   std::vector<Variable> leaves;
   GradientCheckOptions options{};

@@ -23,8 +23,7 @@ bool is_drawn(const std::string& split) { return split != "trial" && split != "n
 // "trial", "pass (seed 3)", "texture (leaving out 6_Bumps)": a split and what decides which windows it tests.
 std::string described(const std::string& split, const std::string& left_out, const std::string& seed) {
   if (!is_drawn(split)) return split;
-  const bool leaves_out = (split == "texture" || split == "group") && !left_out.empty();
-  return split + (leaves_out ? " (leaving out " + left_out + ")" : " (seed " + seed + ")");
+  return split + (left_out.empty() ? " (seed " + seed + ")" : " (leaving out " + left_out + ")");
 }
 std::string described(const ModelFile& file) {
   return described(value_or(file.metadata, "split", "none"), value_or(file.metadata, "leave_out"),
@@ -76,10 +75,12 @@ std::array<Interval, 2> intervals_of(const WindowSet& windows, const PassSums& p
 }  // namespace
 
 TestSet test_set_of(const Arguments& a, const ModelFile& file) {
-  return {a.given("split") ? a.choice("split", {"window", "pass", "trial", "texture", "group", "none"})
-                           : value_or(file.metadata, "split", "none"),
+  const std::string own = value_or(file.metadata, "split", "none");
+  const std::string split =
+      a.given("split") ? a.choice("split", {"window", "pass", "trial", "texture", "group", "none"}) : own;
+  return {split,
           a.given("seed") ? a.seed() : parse_uint(value_or(file.metadata, "seed", "0")).value_or(0),
-          comma_list(value_or(file.metadata, "leave_out")),
+          split == own ? comma_list(value_or(file.metadata, "leave_out")) : std::vector<std::string>{},
           {}};
 }
 

@@ -30,9 +30,10 @@ struct TestSet {
 /// --split and --seed, or the model's own; the split itself is left to the caller.
 TestSet test_set_of(const Arguments& a, const ModelFile& file);
 
-/// Cuts the test side to --history and --limit. Throws std::runtime_error when what one model is tested on
-/// may be what another was trained on (not where --split none asks for all of them), or no example is left to
-/// fit the baselines to.
+/// Cuts the test side to --history and --limit, and says what else is to be known of it. Throws UsageError
+/// where --history leaves nothing; std::runtime_error when what one model is tested on may be what another
+/// was trained on (not where --split none asks for all of them), or no example is left to fit the baselines
+/// to.
 void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, const WindowSet& windows,
                     TestSet& tested);
 

@@ -91,6 +91,7 @@ class Stream {
   /// done when that is empty.
   void finish(const std::string& failure = {});
 
+  /// Shown; without a model frames.
   std::uint64_t pictures() const { return latency_.count(); }
   /// Of the live page; empty without.
   std::string url() const { return web_ ? web_->url() : std::string(); }

@@ -17,7 +17,7 @@ void add_to_gradient(Backward& g, std::size_t input, Term term) {
   kernels::each_into(g.value(input).size(), g.slot_of(input), term);
 }
 
-/// For the ops that end in f (ops/activations.h): refuses a negative slope.
+/// For the ops that end in f (ops/activations.cpp has both): refuses a negative slope.
 void check_slope(const char* op, real negative_slope);
 /// For their reverse steps: replaces g's dL/dy by dL/ds = dL/dy f'(s), f' taken from the sign of y, and
 /// returns it.

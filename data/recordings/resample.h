@@ -120,8 +120,8 @@ Track resample(const Recording& recording, const ResampleSettings& settings);
 /// throws ends the reading.
 using ReadingWatch = std::function<void(std::size_t done, std::size_t all)>;
 
-/// Why these signals cannot be those of a sensor whose file states this scale, as the end of a sentence: "run
-/// from 0 to 1 ..., the sensor's range is 40 to 900 counts"; empty where they can. More than half of them lie
+/// Why these signals cannot be those of a sensor whose file states this scale, as the end of a sentence:
+/// "from 0 to 1, the sensor's range is 40 to 900 counts"; empty where they can. More than half of them lie
 /// beyond the range by a quarter of it, or they are shares of 0 to 1 under a range at least ten times as
 /// wide. Imports and training ask it, and the Python package does the same (python/supertac/recordings.py).
 std::string contradiction(std::span<const float> signals, const SignalScale& scale);

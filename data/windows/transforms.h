@@ -34,7 +34,7 @@ constexpr std::size_t kTopRank = 3;     ///< two samples may lie above the top: 
 void normalise_window(std::span<float> window, std::size_t signals);
 
 /// Changes of a training window that imitate what differs between trials: how deep the finger is pressed,
-/// contact, gain, rest level, dead taxels, noise. Each magnitude is off at 0. Magnitudes are in units of the
+/// gain, rest level, dead taxels, noise. Each magnitude is off at 0. Magnitudes are in units of the
 /// scaled signal (0 = rest, 1 = pressed hard).
 struct AugmentSettings {
   double lift = 0;        ///< the finger carried higher: 0 .. lift is taken from every signal, down to 0

@@ -37,8 +37,8 @@ Number within(JsonObject& keys, const char* name, double low, double high, Numbe
 Point3 take_point(JsonObject& keys, const char* name, const std::optional<Point3>& fallback = {}) {
   if (fallback && keys.find(name) == nullptr) return *fallback;
   const std::vector<double> numbers = keys.numbers(name);  // none where it is absent
-  const auto within = [](double v) { return v >= -kFarthest && v <= kFarthest; };
-  if (numbers.size() != 3 || !std::ranges::all_of(numbers, within)) keys.wrong(name, kPoint, Json(numbers));
+  const auto is_near = [](double v) { return v >= -kFarthest && v <= kFarthest; };
+  if (numbers.size() != 3 || !std::ranges::all_of(numbers, is_near)) keys.wrong(name, kPoint, Json(numbers));
   return {numbers[0], numbers[1], numbers[2]};
 }
 

@@ -49,7 +49,7 @@ Decoder::Decoder(const VaeOptions& o, Rng& rng)
 
 Variable Decoder::forward(const Variable& z) const {
   const Dim pixels[] = {coarse_};
-  const Variable wide = unfold_.forward(widen_.forward(z, kRelu), kRelu);     // [N,LD], [N,64], [N,32 T/16]
+  const Variable wide = unfold_.forward(widen_.forward(z, kRelu), kRelu);     // [N,64], [N,32 T/16]
   Variable h = unflatten_channels_first(wide, pixels);                        // [N,T/16,32]
   for (const ConvTranspose1d& conv : conv_) h = conv.forward(h, kLeakyRelu);  // [N,T/8,32], ... [N,T,16]
   return sigmoid(out_.forward(h));                                            // [N,T,channels]

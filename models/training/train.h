@@ -36,8 +36,8 @@ Split split_of(const WindowSet& windows, const Recipe& recipe, std::vector<std::
 
 /// Reads a folder of recordings, twice, each time watched; adds random and silent passes, splits. Throws
 /// std::invalid_argument as Recipe::check, and when random plates are asked for though the signals rest at
-/// another level than the recordings state; std::runtime_error as WindowSet::load, and when the signal range
-/// clips most of the signals.
+/// another level than the recordings state; std::runtime_error as WindowSet::load, when taxels that should
+/// feel do not, and when the signal range clips most of the signals.
 TrainingTask window_task(const Recipe& recipe, const std::string& recordings, const ReadingWatch& watch = {});
 
 /// One line of a training's log: means over the steps since the line before.

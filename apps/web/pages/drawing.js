@@ -1,4 +1,5 @@
 // How the live page draws its canvases; what it draws is in page.js, which follows.
+
 // A canvas of as many dots as the screen has; sizes below are in CSS pixels.
 function prepared(canvas) {
   const ratio = window.devicePixelRatio || 1, w = canvas.clientWidth, h = canvas.clientHeight;

@@ -111,7 +111,7 @@ TEST_F(Mpi, StoppedByFourAndResumedByTwo) {
   EXPECT_TRUE(bytes("whole.safetensors") == bytes("part.safetensors"));
 }
 
-TEST_F(Mpi, ANumberThatCannotShareTheLanesAndARankWithAnotherOptionAreNamed) {
+TEST_F(Mpi, ANumberThatCannotShareTheMicroBatchesAndARankWithAnotherOptionAreNamed) {
   const auto with = [](const std::string& more) { return options("odd.safetensors", more); };
   expect_one_line(mpirun(ranks(3, with(""))), "3 processes cannot share the 8 micro-batches of a batch of ");
   expect_one_line(mpirun(ranks(1, with("")) + " :" + ranks(1, with("--beta 0.5"))),
