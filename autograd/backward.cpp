@@ -47,9 +47,11 @@ void check_not_freed(const Node& node) {
            std::string("one whose op ") + node.op + " an earlier backward freed; run the forward pass again");
 }
 
-void check_gradient(const Node& x) {
+// Of the loss, or of that input of `reader`: a leaf has no name.
+void check_gradient(const Node& x, const Node* reader = nullptr, std::size_t input = 0) {
   if (x.grad.shape() == x.value.shape()) return;
-  refuse("backward", std::string("the gradient of ") + x.op, x.value.text(), x.grad.text());
+  const std::string whose = reader ? "input " + std::to_string(input) + " of " + reader->op : "loss";
+  refuse("backward", "the gradient of " + whose, x.value.text(), x.grad.text());
 }
 
 // Runs one node's reverse step and queues the inputs it has reached.
@@ -96,7 +98,7 @@ Slot Backward::slot_of(std::size_t input) {
   Node& x = *node_.inputs[input];
   if (!x.requires_grad) return {};
   if (x.grad.defined()) {
-    check_gradient(x);
+    check_gradient(x, &node_, input);
     return {x.grad.data(), Into::add};
   }
   x.grad = Tensor(x.value.shape());

@@ -114,7 +114,7 @@ Variable take_runs(const Variable& x, const Runs& r) {
 Variable last_frame(const Variable& x, Dim rows, Dim columns, Dim channels) {
   check_rank("last_frame", "windows", x, 3);
   const Dim images = x.dim(0), frames = x.dim(1);
-  if (frames < 1) refuse("last_frame", "windows", "one frame or more", x.shape().text());
+  if (frames < 1 || x.dim(2) < 1) refuse("last_frame", "windows", "[N,T,S] with T, S >= 1", x.shape().text());
   check_between("last_frame", "rows", rows, 1, x.dim(2));
   check_between("last_frame", "columns", columns, 1, x.dim(2) / rows);
   check_between("last_frame", "channels", channels, 1, x.dim(2) / (rows * columns));

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "io/numbers/text.h"
+
 namespace supertac {
 namespace {
 
@@ -244,10 +246,9 @@ BoardFrame parse_frame(const std::byte* bytes) {
 
 void write_frame(const BoardFrame& frame, std::span<std::byte, rig::kFrameBytes> out) {
   const auto put = [&out](std::size_t at, std::uint16_t value) {
-    if (value >= rig::kAdcCodes) {
-      throw std::invalid_argument("write_frame: sample " + std::to_string(value) + ", expected at most " +
-                                  std::to_string(rig::kAdcCodes - 1));
-    }
+    if (value >= rig::kAdcCodes)
+      throw std::invalid_argument(refusal(
+          "write_frame", "sample", "0 to " + std::to_string(rig::kAdcCodes - 1), std::to_string(value)));
     out[at] = static_cast<std::byte>(value >> 8);
     out[at + 1] = static_cast<std::byte>(value & 0xFF);
   };

@@ -8,6 +8,7 @@
 #include "io/files/safetensors.h"
 #include "io/images/images.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -142,7 +143,7 @@ void check_map_path(const std::string& path) {
 
 void write_maps(const OutputPath& output, const std::vector<NamedMap>& maps) {
   check_map_path(output.path);
-  if (maps.empty()) throw std::invalid_argument("map: expected at least one, got none");
+  if (maps.empty()) throw std::invalid_argument(refusal("write_maps", "maps", "1 or more", "0"));
   if (output.path.ends_with(".safetensors")) return write_tensors(output, maps);
   AtomicFile file(output);
   if (output.path.ends_with(".png")) {
@@ -151,8 +152,9 @@ void write_maps(const OutputPath& output, const std::vector<NamedMap>& maps) {
     file.write(table_of(maps));
   } else {
     if (maps.size() > 1)
-      throw std::invalid_argument("map: a solid is made of one surface, found " +
-                                  std::to_string(maps.size()) + "; choose one plate, or write .safetensors");
+      throw std::invalid_argument(
+          refusal("write_maps", "maps", "the surface of one plate for .stl",
+                  std::to_string(maps.size()) + "; choose one plate, or write .safetensors"));
     file.write(stl_bytes(solid_of(maps.front()), "map " + maps.front().name));
   }
   file.commit();

@@ -9,6 +9,7 @@
 
 #include "io/numbers/numbers.h"
 #include "io/numbers/same_bits.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -133,15 +134,13 @@ void SurfaceMap::make_room(const MapRegion& region) {
 void SurfaceMap::add(double x_mm, double y_mm, std::span<const float> picture,
                      std::span<const float> errors) {
   if (!std::isfinite(x_mm) || !std::isfinite(y_mm)) return;
-  if (picture.size() != grid_.pixels() || (!errors.empty() && errors.size() != picture.size()) ||
-      (pictures_ > 0 && has_errors_ == errors.empty()))
-    throw std::invalid_argument(
-        "map: expected pictures of " + grid_.text() + " pixels, all with errors or all without, got " +
-        std::to_string(picture.size()) + " and " + std::to_string(errors.size()) + " errors");
+  expect_values("map", "picture", grid_.pixels(), picture.size());
+  const bool with_errors = pictures_ > 0 ? has_errors_ : !errors.empty();  // all pictures or none
+  expect_values("map", "errors", with_errors ? picture.size() : 0, errors.size());
   constexpr double kFarthest = 1e15;  // whole numbers are exact below
   const Pitch pixel = grid_.pixel_mm;
   if (std::abs(x_mm) > kFarthest * pixel.x || std::abs(y_mm) > kFarthest * pixel.y)
-    throw std::runtime_error("map: expected a position in mm, got " + format(x_mm) + ", " + format(y_mm));
+    throw std::runtime_error(refusal("map", "position", "mm", format(x_mm) + ", " + format(y_mm)));
   const Place x = place_of(x_mm, pixel.x, grid_.width), y = place_of(y_mm, pixel.y, grid_.height);
   const MapRegion covered = {x.first, y.first, grid_.width, grid_.height};
   make_room(covered);

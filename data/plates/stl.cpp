@@ -137,13 +137,11 @@ std::vector<Triangle> read_stl(const std::string& path) {
 }
 
 std::vector<std::byte> stl_bytes(const std::vector<Triangle>& triangles, std::string_view title) {
-  const std::size_t size = kHeadBytes + kFacetBytes * triangles.size();
-  if (size > kMaxStlBytes)
-    throw std::invalid_argument("stl_bytes: " + std::to_string(triangles.size()) +
-                                " triangles make a file of " + std::to_string(size) +
-                                " bytes, expected at most " + std::to_string(kMaxStlBytes) +
-                                "; try a coarser resolution");
-  std::vector<std::byte> bytes(size);
+  constexpr std::size_t kMost = (kMaxStlBytes - kHeadBytes) / kFacetBytes;
+  if (triangles.size() > kMost)
+    throw std::invalid_argument(refusal("stl_bytes", "triangles", "at most " + std::to_string(kMost),
+                                        std::to_string(triangles.size()) + "; try a coarser resolution"));
+  std::vector<std::byte> bytes(kHeadBytes + kFacetBytes * triangles.size());
   std::memcpy(bytes.data(), title.data(), std::min(title.size(), kTitleBytes));
   const auto count = static_cast<std::uint32_t>(triangles.size());
   std::memcpy(bytes.data() + kTitleBytes, &count, sizeof count);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "io/numbers/median.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 
@@ -18,10 +19,9 @@ double truth_value(const Plate& plate, double x_mm, double y_mm) {
 
 void truth_image(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid,
                  std::span<float> image) {
-  if (grid.height < 1 || grid.width < 1 || image.size() != grid.pixels())
-    throw std::invalid_argument(
-        "truth_image: expected a picture of 1x1 pixels or more and room for all, got " + grid.text() +
-        " pixels and room for " + std::to_string(image.size()));
+  if (grid.height < 1 || grid.width < 1)
+    throw std::invalid_argument(refusal("truth_image", "grid", "1x1 pixels or more", grid.text()));
+  expect_values("truth_image", "image", grid.pixels(), image.size());
   const bool uniform = plate.uniform_in_x();  // then a row has one height
   const auto width = static_cast<std::size_t>(grid.width);
   for (int r = 0; r < grid.height; ++r) {

@@ -237,8 +237,8 @@ std::map<std::string, std::string> metadata_of(const Recording& recording) {
   auto metadata = recording.metadata;
   for (const char* field : kFields)
     if (metadata.contains(field))
-      throw std::invalid_argument("write_recording: the metadata field " + in_quotes(field) +
-                                  " is a member of the recording; set it there");
+      throw std::invalid_argument(refusal("write_recording", "metadata", "no member of the recording",
+                                          in_quotes(field) + "; set it there"));
   metadata["kind"] = "recording";
   metadata["plate"] = recording.plate;
   metadata["trial"] = std::to_string(recording.trial);
@@ -256,8 +256,8 @@ std::map<std::string, std::string> metadata_of(const Recording& recording) {
 
 std::string recording_file_name(const Recording& recording) {
   if (recording.plate.find('/') != std::string::npos)
-    throw std::invalid_argument("recording: expected a plate's name without '/', found " +
-                                in_quotes(recording.plate));
+    throw std::invalid_argument(
+        refusal("recording", "plate", "a name without '/'", in_quotes(recording.plate)));
   return recording.plate + "_t" + std::to_string(recording.trial) + "_p" + std::to_string(recording.pass) +
          "_v" + format(recording.speed_mm_s) + ".safetensors";
 }

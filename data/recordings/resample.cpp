@@ -45,9 +45,10 @@ void append_run(const Recording& recording, const ResampleSettings& settings, st
   // A file that claims a high rate must not decide how much memory that takes.
   constexpr std::size_t kMostPerFrame = 64;
   if (samples > kMostPerFrame * (end - first + 1))
-    throw std::invalid_argument("resample: " + std::to_string(settings.rate_hz) +
-                                " samples a second are more than " + std::to_string(kMostPerFrame) +
-                                " for each recorded frame; the model is of another sensor");
+    throw std::invalid_argument(
+        refusal("resample", "rate_hz",
+                "at most " + std::to_string(kMostPerFrame) + " samples for each recorded frame",
+                format(settings.rate_hz) + " Hz; the model is of another sensor"));
   const std::size_t signals = recording.array.signals(), begin = track.samples.size();
   track.samples.resize(begin + samples * signals);
   track.held += samples;

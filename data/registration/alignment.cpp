@@ -10,6 +10,7 @@
 #include "data/registration/registration.h"
 #include "io/numbers/median.h"
 #include "io/numbers/parallel.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -232,8 +233,8 @@ void align_passes(std::span<const RegisteredPass> passes) {
   for (const RegisteredPass& pass : passes) {
     if (!pass.registration->reliable) continue;
     if (pass.recording->array != TaxelArray{})
-      throw std::invalid_argument("align_passes: expected recordings of the rig's " + TaxelArray{}.text() +
-                                  ", got " + pass.recording->array.text());
+      throw std::invalid_argument(refusal("align_passes", "recording", "the rig's " + TaxelArray{}.text(),
+                                          pass.recording->array.text()));
     reliable.push_back({pass.registration, *pass.registration, {*pass.recording, *pass.registration}});
     Registration& r = reliable.back().registration;
     r.shift_mm = r.stretch_mm = r.lost_at_s = r.lost_s = 0;

@@ -12,6 +12,7 @@
 
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -105,9 +106,9 @@ std::vector<Contact> find_contacts(const Recording& recording, double reach_s) {
   if (n < 3) return found;
   const double duration = recording.time_s.back() - recording.time_s.front();
   if (!(duration > 0) || duration / kBinS > static_cast<double>(kMaxBins))
-    throw std::invalid_argument("find_contacts: time stamps must increase and span at most " +
-                                std::to_string(static_cast<int>(kMaxBins * kBinS)) + " s, got a span of " +
-                                format(duration) + " s");
+    throw std::invalid_argument(refusal(
+        "find_contacts", "time_s", "a span of more than 0 and at most " + format(kMaxBins * kBinS) + " s",
+        format(duration) + " s"));
   const auto bins = static_cast<std::size_t>(duration / kBinS);
   for (int k = 0; k < recording.array.taxels(); ++k)
     find_in(binned(recording, k, bins), k, recording.time_s[0], reach_s, found);

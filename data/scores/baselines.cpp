@@ -13,14 +13,14 @@ namespace supertac {
 namespace {
 
 std::vector<std::uint32_t> fitted_on(std::span<const std::uint32_t> train) {
-  if (train.empty()) throw std::invalid_argument("baseline: there is no example to fit to");
+  if (train.empty()) throw std::invalid_argument(refusal("baseline", "train", "a window or more", "none"));
   return evenly_spaced(train, kFitWindows);
 }
 
 void check_input(std::span<const float> input, const TaxelArray& array) {
   if (input.empty() || input.size() % array.signals() != 0)
-    throw std::invalid_argument("baseline: an input is [T][" + std::to_string(array.signals()) + "], got " +
-                                std::to_string(input.size()) + " values");
+    throw std::invalid_argument(refusal("baseline", "window", "[T][" + std::to_string(array.signals()) + "]",
+                                        std::to_string(input.size()) + " values"));
 }
 
 double keys_kernel(double distance) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "data/plates/truth.h"
+#include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
 #include "io/numbers/same_bits.h"
 #include "io/numbers/text.h"
@@ -126,7 +127,8 @@ nlohmann::ordered_json to_json(const Metrics& metrics) {
 ImageScores ZoneMetrics::scores_of(std::span<const float> output, std::span<const float> truth) const {
   for (std::size_t i = 0; i < output.size(); ++i)
     if (!std::isfinite(output[i]))
-      throw std::invalid_argument("metrics: output pixel " + std::to_string(i) + " is not finite");
+      throw std::invalid_argument(
+          refusal("metrics", "output pixel " + std::to_string(i), "a finite number", format(output[i])));
   ImageScores scores;
   scores.mse = mean_squared_error(output, truth);
   scores.ssim =

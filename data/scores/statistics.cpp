@@ -11,6 +11,7 @@
 
 #include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -31,14 +32,12 @@ double share(std::span<const ClusterCount> clusters) {
 
 Interval bootstrap_interval(std::span<const ClusterCount> clusters, std::span<const std::size_t> strata) {
   const std::size_t count = clusters.size();
-  if (count == 0 || (!strata.empty() && strata.size() != count))
-    throw std::invalid_argument(
-        "bootstrap_interval: expected a cluster at least, and a stratum for each or none, got " +
-        std::to_string(count) + " and " + std::to_string(strata.size()));
+  if (count == 0) throw std::invalid_argument(refusal("bootstrap_interval", "clusters", "1 or more", "0"));
+  if (!strata.empty()) expect_values("bootstrap_interval", "strata", count, strata.size());
   for (const ClusterCount& c : clusters)
     if (!(c.total > 0))
-      throw std::invalid_argument("bootstrap_interval: expected clusters with a total above 0, got " +
-                                  format(c.total));
+      throw std::invalid_argument(
+          refusal("bootstrap_interval", "total of a cluster", "more than 0", format(c.total)));
   std::vector<std::size_t> order(count);  // clusters by stratum
   std::iota(order.begin(), order.end(), std::size_t{0});
   if (!strata.empty()) std::ranges::stable_sort(order, {}, [&](std::size_t c) { return strata[c]; });
@@ -63,11 +62,11 @@ Interval bootstrap_interval(std::span<const ClusterCount> clusters, std::span<co
 
 double sign_flip_p(std::span<const double> differences) {
   if (differences.empty())
-    throw std::invalid_argument("sign_flip_p: expected at least one difference, got none");
+    throw std::invalid_argument(refusal("sign_flip_p", "differences", "1 or more", "0"));
   double observed = 0, size = 0;
   for (const double d : differences) {
     if (!std::isfinite(d))
-      throw std::invalid_argument("sign_flip_p: expected finite differences, got " + format(d));
+      throw std::invalid_argument(refusal("sign_flip_p", "differences", "finite numbers", format(d)));
     observed += d;
     size += std::abs(d);
   }

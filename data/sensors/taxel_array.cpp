@@ -21,8 +21,8 @@ void TaxelArray::check() const {
   if (within(rows, 1, 64) && within(columns, 1, 64) && within(channels, 1, 8) &&
       within(pitch_mm.x, 0.1, 100) && within(pitch_mm.y, 0.1, 100))
     return;
-  throw std::invalid_argument(
-      "array: expected 1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm; got " + text());
+  throw std::invalid_argument(refusal(
+      "array", "layout", "1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm", text()));
 }
 
 std::vector<float> mean_of_channels(const TaxelArray& array, std::span<const float> frame) {

@@ -8,6 +8,7 @@
 #include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/same_bits.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -136,8 +137,8 @@ class Press {
 Recording simulate_presses(const Sensor& sensor, const Presses& presses, std::uint64_t seed) {
   const int scale = presses.scale;
   if (sensor.array.channels != 1 && sensor.array.channels != 3)
-    throw std::invalid_argument("presses: expected an array of one channel or three axes, got " +
-                                sensor.array.text());
+    throw std::invalid_argument(
+        refusal("presses", "array", "one channel or three axes", sensor.array.text()));
   Recording recording;
   recording.array = sensor.array, recording.body = sensor.body, recording.signal_scale = sensor.scale;
   recording.plate = recording.metadata["group"] = presses.kind;

@@ -181,8 +181,8 @@ const std::vector<std::string>& press_kinds() { return kKinds; }
 Scene::Scene(const Objects& objects, const TaxelArray& array, const RandomStream& random) {
   const auto found = std::ranges::find(kKinds, objects.kind);
   if (found == kKinds.end())
-    throw std::invalid_argument("presses: expected a kind of object (" + joined(kKinds, ", ") + "), got " +
-                                in_quotes(objects.kind));
+    throw std::invalid_argument(
+        refusal("presses", "kind", "one of " + joined(kKinds, ", "), in_quotes(objects.kind)));
   const auto named = static_cast<int>(found - kKinds.begin());
   const double u = random.uniform(kCount);
   const auto count = static_cast<std::uint64_t>(std::ranges::upper_bound(kCounts, u) - kCounts.begin());

@@ -11,6 +11,7 @@
 #include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
 #include "io/numbers/same_bits.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -98,8 +99,8 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
     : settings_(settings), noise_(seed, pass_stream(plate, of_pass) + 1) {
   settings.array.check();
   if (settings.array.channels != 1 && settings.array.channels != 3)
-    throw std::invalid_argument("simulator: expected an array of one channel or three axes, got " +
-                                settings.array.text());
+    throw std::invalid_argument(
+        refusal("simulator", "array", "one channel or three axes", settings.array.text()));
   if (settings_.body.skin_mm == 0) settings_.body.skin_mm = Body::of_rig().skin_mm;
   // Of the sensor, of a trial of a plate (one mounting), and of a pass.
   const RandomStream sensor(seed, 0),
@@ -271,18 +272,18 @@ void wander(double strength, std::uint64_t seed, std::uint64_t stream, FingerPos
 }
 
 void check(const PassSettings& pass, const SimulatorSettings& settings) {
-  const auto positive = [](double v) { return std::isfinite(v) && v > 0; };
-  if (!positive(pass.speed_mm_s) || !positive(settings.rate_hz) || !(pass.to_mm > pass.from_mm) ||
-      !(pass.from_mm >= 0) || !(pass.to_mm <= rig::kPlateLengthMm))
-    throw std::invalid_argument(
-        "simulate_pass: speed and rate must be positive and the slide lie on the plate (0.." +
-        format(rig::kPlateLengthMm) + " mm); got speed " + format(pass.speed_mm_s) + " mm/s, rate " +
-        format(settings.rate_hz) + " Hz, slide from " + format(pass.from_mm) + " to " + format(pass.to_mm) +
-        " mm");
-  if (pass.pass < 1 || pass.pass > rig::kPasses || pass.trial < 1)
-    throw std::invalid_argument("simulate_pass: expected pass 1.." + std::to_string(rig::kPasses) +
-                                " and trial >= 1, got pass " + std::to_string(pass.pass) + ", trial " +
-                                std::to_string(pass.trial));
+  const auto require = [](bool holds, const char* argument, const std::string& expected, double found) {
+    if (!holds) throw std::invalid_argument(refusal("simulate_pass", argument, expected, format(found)));
+  };
+  const double speed = pass.speed_mm_s, rate = settings.rate_hz, from = pass.from_mm, to = pass.to_mm,
+               end = rig::kPlateLengthMm;
+  require(std::isfinite(speed) && speed > 0, "speed_mm_s", "a finite number above 0", speed);
+  require(std::isfinite(rate) && rate > 0, "rate_hz", "a finite number above 0", rate);
+  require(from >= 0 && from < end, "from_mm", "0 to below " + format(end), from);
+  require(to > from && to <= end, "to_mm", "above from_mm, " + format(from) + ", to " + format(end), to);
+  const bool known = pass.pass >= 1 && pass.pass <= rig::kPasses;
+  require(known, "pass", "1 to " + std::to_string(rig::kPasses), pass.pass);
+  require(pass.trial >= 1, "trial", "1 or more", pass.trial);
 }
 
 // The mean of the newest sample and those before it, `length` in all or as many as there are.

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kTestShare = 0.2;
 constexpr std::uint64_t kWindowStream = 0, kPlateStream = 1, kPassStream = 2, kHeldOutStream = 1;
+constexpr const char* kTwo = "two, one to train on, one to test on";
 
 constexpr const char* kNames[] = {"window", "pass", "trial", "texture", "group", "none"};  // by SplitKind
 
@@ -54,8 +55,8 @@ std::vector<Side> split_passes(const WindowSet& windows, std::uint64_t seed) {
   std::uint64_t stream = kPassStream;
   for (const auto& [plate, passes] : passes_by(&WindowSet::Pass::plate, windows)) {
     if (passes.size() < 2)
-      throw std::invalid_argument("split pass: plate '" + plate +
-                                  "' has one pass with windows, needs two: one to train on, one to test on");
+      throw std::invalid_argument(refusal("split pass", "passes with windows over " + in_quotes(plate), kTwo,
+                                          std::to_string(passes.size())));
     const EpochOrder order(passes.size(), seed, stream++);
     for (std::size_t i = 0; i < test_count(passes.size()); ++i) sides[passes[order[i]]] = Side::test;
   }
@@ -66,8 +67,9 @@ std::vector<Side> split_trials(const WindowSet& windows) {
   std::vector<Side> sides;
   for (const WindowSet::Pass& pass : windows.passes()) {
     if (pass.windows > 0 && pass.trial == 0)
-      throw std::invalid_argument("split trial: pass " + std::to_string(pass.pass) + " over '" + pass.plate +
-                                  "' has no trial; use split group or pass, or record it with one");
+      throw std::invalid_argument(
+          refusal("split trial", "pass " + std::to_string(pass.pass) + " over " + in_quotes(pass.plate),
+                  "a trial", "none; use split group or pass, or record it with one"));
     sides.push_back(pass.use.training_only || pass.trial == 1 ? Side::train : Side::test);
   }
   return sides;
@@ -78,16 +80,16 @@ std::vector<Side> split_groups(const WindowSet& windows, std::uint64_t seed,
   const PassNumbers groups = passes_by(&WindowSet::Pass::group, windows);
   if (groups.size() < 2 || groups.contains(""))
     throw std::invalid_argument(
-        "split group: every recording needs metadata 'group' and there must be two groups, one to train on, "
-        "one to test on; " +
-        std::string(groups.contains("") ? "some have none: use split pass"
-                                        : "there is one: use split window"));
+        refusal("split group", "metadata 'group'",
+                "every recording to have it, and two groups, one to train on, one to test on",
+                groups.contains("") ? "recordings without: use split pass" : "one: use split window"));
   std::vector<Side> sides(windows.passes().size(), Side::train);
   if (leave_out.empty()) leave_out = drawn(groups, test_count(groups.size()), seed, kWindowStream);
   for (const std::string& name : leave_out) {
     if (!groups.contains(name))
-      throw std::invalid_argument("split group: the data has no group '" + name + "' to leave out; it has " +
-                                  joined(groups, ", ", [](const auto& group) { return group.first; }));
+      throw std::invalid_argument(refusal(
+          "split group", "leave_out",
+          "one of " + joined(groups, ", ", [](const auto& group) { return group.first; }), in_quotes(name)));
     for (const std::size_t p : groups.at(name)) sides[p] = Side::test;
   }
   return sides;
@@ -98,14 +100,13 @@ std::vector<Side> split_plates(const WindowSet& windows, std::uint64_t seed,
   std::vector<Side> sides(windows.passes().size(), Side::train);
   const PassNumbers plates = passes_by(&WindowSet::Pass::plate, windows);
   if (plates.size() < 2 && leave_out.empty())
-    throw std::invalid_argument("split texture: the data has " + std::to_string(plates.size()) +
-                                " plate, needs two: one to train on, one to test on");
+    throw std::invalid_argument(refusal("split texture", "plates", kTwo, std::to_string(plates.size())));
   if (leave_out.empty()) leave_out = drawn(plates, 1, seed, kPlateStream);
   for (const std::string& name : leave_out) {
     const auto held_out = plates.find(name);
     if (held_out == plates.end())
-      throw std::invalid_argument("split texture: the data has no windows of plate '" + name +
-                                  "' to leave out");
+      throw std::invalid_argument(
+          refusal("split texture", "leave_out", "a plate with windows in the data", in_quotes(name)));
     const Plate& tested = windows.plate(held_out->second.front());
     for (std::size_t pass = 0; pass < sides.size(); ++pass)
       if (sides[pass] == Side::train && windows.passes()[pass].windows > 0 &&
@@ -121,8 +122,7 @@ Split split_windows(const WindowSet& windows, std::uint64_t seed) {
   for (std::uint32_t i = 0; i < windows.size(); ++i)
     if (!windows.passes()[windows.pass_of(i)].use.training_only) own.push_back(i);
   if (own.size() < 2)
-    throw std::invalid_argument("split window: the data has " + std::to_string(own.size()) +
-                                " windows, needs two: one to train on, one to test on");
+    throw std::invalid_argument(refusal("split window", "windows", kTwo, std::to_string(own.size())));
   const EpochOrder order(own.size(), seed, kWindowStream);
   std::vector<bool> tested(windows.size(), false);
   for (std::size_t i = 0; i < test_count(own.size()); ++i) tested[own[order[i]]] = true;
@@ -171,8 +171,8 @@ Split split_of(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
 SplitKind split_kind(const std::string& name) {
   const auto found = std::ranges::find(kNames, name);
   if (found == std::end(kNames))
-    throw std::invalid_argument("split: expects window, pass, trial, texture, group or none, got '" + name +
-                                "'");
+    throw std::invalid_argument(
+        refusal("split", "name", "window, pass, trial, texture, group or none", in_quotes(name)));
   return static_cast<SplitKind>(found - std::begin(kNames));
 }
 
@@ -182,12 +182,13 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
                  const std::vector<std::string>& leave_out) {
   Split split = split_of(windows, kind, seed, leave_out);
   if (split.train.empty() || split.test.empty())
-    throw std::invalid_argument(
-        "split " + name_of(kind) + ": no window to " + (split.train.empty() ? "train on" : "test on") +
-        (kind == SplitKind::trial     ? "; the data needs trials 1 and 2; split pass or group does without"
-         : kind == SplitKind::texture ? "; the data has nothing unlike what is left out: train beside random "
-                                        "plates, score with split none"
-                                      : ""));
+    throw std::invalid_argument(refusal(
+        "split " + name_of(kind), "windows",
+        split.train.empty() ? "one or more to train on" : "one or more to test on",
+        kind == SplitKind::trial     ? "none; the data needs trials 1 and 2; split pass or group does without"
+        : kind == SplitKind::texture ? "none; the data has nothing unlike what is left out: train beside "
+                                       "random plates, score with split none"
+                                     : "none"));
   return split;
 }
 

@@ -58,9 +58,9 @@ std::array<Range, kAtOnce> ranges_of(std::span<const float> window, std::size_t 
 void normalise_window(std::span<float> window, std::size_t signals) {
   if (signals == 0 || window.empty() || window.size() % signals != 0 ||
       window.size() / signals > std::numeric_limits<std::uint16_t>::max())
-    throw std::invalid_argument("normalise_window: a window is [T][" + std::to_string(signals) +
-                                "], T up to " + std::to_string(std::numeric_limits<std::uint16_t>::max()) +
-                                ", got " + std::to_string(window.size()) + " values");
+    throw std::invalid_argument(refusal("normalise_window", "window",
+                                        "[T][" + std::to_string(signals) + "] with T from 1 to 65535",
+                                        std::to_string(window.size()) + " values"));
   float gain = kLeastGain;
   for (std::size_t first = 0; first < signals; first += kAtOnce) {
     const std::size_t count = std::min(kAtOnce, signals - first);
@@ -129,9 +129,9 @@ void augment(const AugmentSettings& settings, std::uint64_t seed, std::uint64_t 
              std::span<float> window, const TaxelArray& array) {
   const std::size_t signals = array.signals();
   if (window.size() % signals != 0)
-    throw std::invalid_argument("augment: a window of " + array.text() + " is [T][" +
-                                std::to_string(signals) + "], got " + std::to_string(window.size()) +
-                                " values");
+    throw std::invalid_argument(refusal("augment", "window",
+                                        "[T][" + std::to_string(signals) + "] of " + array.text(),
+                                        std::to_string(window.size()) + " values"));
   if (!settings.any()) return;
   check(settings, array);
   const RandomStream random(seed, stream_named("aug") << 40 ^ sample);  // clear of the streams of others

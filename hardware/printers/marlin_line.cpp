@@ -113,17 +113,15 @@ std::string shielded(std::string_view command) {
 }
 
 std::string numbered_line(std::int64_t number, std::string_view command) {
-  if (command.find_first_of("\r\n*") != std::string_view::npos) {
-    throw std::invalid_argument("marlin line: a command may not hold a line break or '*', got " +
-                                in_quotes(command));
-  }
+  if (command.find_first_of("\r\n*") != std::string_view::npos)
+    throw std::invalid_argument(
+        refusal("marlin line", "command", "neither a line break nor '*'", in_quotes(command)));
   std::string line = "N" + std::to_string(number) + " " + std::string(command);
   line += "*" + std::to_string(marlin_checksum(line)) + "\n";
-  if (line.size() > kMaxLineBytes) {
-    throw std::invalid_argument("marlin line: " + std::to_string(line.size()) +
-                                " bytes, Marlin takes at most " + std::to_string(kMaxLineBytes) + ": " +
-                                in_quotes(command));
-  }
+  if (line.size() > kMaxLineBytes)
+    throw std::invalid_argument(refusal("marlin line", "command",
+                                        "a line of at most " + std::to_string(kMaxLineBytes) + " bytes",
+                                        std::to_string(line.size()) + " for " + in_quotes(command)));
   return line;
 }
 

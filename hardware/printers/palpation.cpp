@@ -86,13 +86,12 @@ double seconds_left(const Leg& now, const Point3& at) {
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
   const auto usable = [](double value) { return value > 0 && std::isfinite(value); };
   if (plan.passes < 1 || plan.passes > kMostPasses || !usable(plan.slide) || !usable(plan.lift) ||
-      !usable(plan.speed)) {
-    throw std::invalid_argument("palpation: expected 1 to " + std::to_string(kMostPasses) +
-                                " passes, and slide, lift and speed above 0, got " +
-                                std::to_string(plan.passes) + " passes, a slide of " + format(plan.slide) +
-                                " mm, a lift of " + format(plan.lift) + " mm and " + format(plan.speed) +
-                                " mm/s");
-  }
+      !usable(plan.speed))
+    throw std::invalid_argument(
+        refusal("palpation", "plan",
+                "1 to " + std::to_string(kMostPasses) + " passes, and slide, lift and speed above 0",
+                std::to_string(plan.passes) + " passes, a slide of " + format(plan.slide) +
+                    " mm, a lift of " + format(plan.lift) + " mm and " + format(plan.speed) + " mm/s"));
   std::vector<Leg> legs;
   Point3 at = here;
   const auto add = [&](int pass, Phase phase, const Point3& to, double speed) {

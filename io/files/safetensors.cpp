@@ -206,6 +206,10 @@ bool check_checksum(const std::string& path, const Header& header, std::string t
   return true;
 }
 
+[[noreturn]] void wrong(const std::string& argument, const std::string& expected, const std::string& got) {
+  throw std::invalid_argument(refusal("write_safetensors", argument, expected, got));
+}
+
 void hand_over(const TensorToWrite& tensor, const ByteSink& sink) {
   tensor.read ? tensor.read(sink) : sink(tensor.data);
 }
@@ -220,11 +224,8 @@ std::uint32_t checksum_of(const std::string& header, std::span<const TensorToWri
       bytes += piece.size();
     });
     const std::uint64_t expected = *tensor_bytes(tensor.dtype, tensor.shape);
-    if (bytes != expected) {
-      throw std::invalid_argument("write_safetensors: tensor " + in_quotes(tensor.name) + " has " +
-                                  std::to_string(bytes) + " bytes, its shape and type need " +
-                                  std::to_string(expected));
-    }
+    if (bytes != expected)
+      wrong("tensor " + in_quotes(tensor.name), std::to_string(expected) + " bytes", std::to_string(bytes));
   }
   return sum;
 }
@@ -259,24 +260,20 @@ void hand_over(const std::string& header, std::span<const TensorToWrite> tensors
 
 void check_writable(const std::map<std::string, std::string>& metadata,
                     const std::vector<TensorToWrite>& tensors) {
-  const auto wrong = [](const std::string& problem) {
-    throw std::invalid_argument("write_safetensors: " + problem);
-  };
-  for (const char* key : {kFormatKey, kChecksumKey}) {
-    if (metadata.contains(key))
-      wrong("the metadata field " + in_quotes(key) + " is written by this function");
-  }
+  for (const char* key : {kFormatKey, kChecksumKey})
+    if (metadata.contains(key)) wrong("metadata", "no field that this function writes", in_quotes(key));
   if (metadata.size() + 2 > kMaxFields)
-    wrong(std::to_string(metadata.size()) + " metadata fields are too many");
-  if (tensors.size() > kMaxTensors) {
-    wrong(std::to_string(tensors.size()) + " tensors, expected at most " + std::to_string(kMaxTensors));
-  }
+    wrong("metadata", "at most " + std::to_string(kMaxFields - 2) + " fields",
+          std::to_string(metadata.size()));
+  if (tensors.size() > kMaxTensors)
+    wrong("tensors", "at most " + std::to_string(kMaxTensors), std::to_string(tensors.size()));
   std::set<std::string> names = {kMetadataKey};
   for (const TensorToWrite& tensor : tensors) {
-    if (!names.insert(tensor.name).second) wrong("the name " + in_quotes(tensor.name) + " is taken");
+    if (!names.insert(tensor.name).second) wrong("tensors", "names not taken", in_quotes(tensor.name));
     const auto bytes = tensor_bytes(tensor.dtype, tensor.shape);
     if (!bytes)
-      wrong("tensor " + in_quotes(tensor.name) + " has unknown type " + in_quotes(tensor.dtype) + " or size");
+      wrong("tensor " + in_quotes(tensor.name), "a known type, rank <= 16, below 2^64 bytes",
+            in_quotes(tensor.dtype) + " [" + joined(tensor.shape) + "]");
   }
 }
 
@@ -362,12 +359,10 @@ void write_safetensors(const OutputPath& output, std::map<std::string, std::stri
   try {
     text = header_text(std::move(metadata), tensors);
   } catch (const nlohmann::json::exception&) {
-    throw std::invalid_argument("write_safetensors: a name or metadata field is not valid UTF-8");
+    wrong("names and metadata", "valid UTF-8", "other bytes");
   }
-  if (text.size() > kMaxHeaderBytes) {
-    throw std::invalid_argument("write_safetensors: the header has " + std::to_string(text.size()) +
-                                " bytes, expected at most " + std::to_string(kMaxHeaderBytes));
-  }
+  if (text.size() > kMaxHeaderBytes)
+    wrong("header", "at most " + std::to_string(kMaxHeaderBytes) + " bytes", std::to_string(text.size()));
 
   AtomicFile file(output);
   hand_over(text, tensors, [&file](std::span<const std::byte> piece) { file.write(piece); });

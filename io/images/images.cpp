@@ -79,9 +79,8 @@ struct Panel {
 // Pixels are enlarged without smoothing.
 void draw_panel(Picture& picture, const Panel& panel, const PanelValues& shown) {
   const auto [values, rows, columns] = shown;
-  if (values.size() != static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns))
-    throw std::invalid_argument("panel_grid: expects " + std::to_string(rows) + " x " +
-                                std::to_string(columns) + " values, got " + std::to_string(values.size()));
+  expect_values("panel_grid", "panel", static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns),
+                values.size());
   for (int y = 0; y < panel.height; ++y) {
     const int row = rows - 1 - y * rows / panel.height;
     for (int x = 0; x < panel.width; ++x)
@@ -123,12 +122,12 @@ void Picture::set(int x, int y, Rgb colour) {
 }
 
 Picture panel_grid(std::span<const PanelValues> panels, int across, int side) {
-  if (panels.empty()) throw std::invalid_argument("panel_grid: there is no panel to draw");
+  if (panels.empty()) throw std::invalid_argument(refusal("panel_grid", "panels", "1 or more", "0"));
   for (const auto& [values, rows, columns] : panels)
     if (std::max(rows, columns) > side)
-      throw std::invalid_argument("panel_grid: panels of " + std::to_string(side) +
-                                  " pixels cannot show more values a side, got " +
-                                  std::to_string(std::max(rows, columns)));
+      throw std::invalid_argument(refusal(
+          "panel_grid", "side", std::to_string(std::max(rows, columns)) + " pixels or more, one for a value",
+          std::to_string(side)));
   const int longer = std::max(panels.front().rows, panels.front().columns), gap = std::max(1, side / 16),
             width = side * panels.front().columns / longer, height = side * panels.front().rows / longer,
             count = static_cast<int>(panels.size()), down = (count + across - 1) / across;

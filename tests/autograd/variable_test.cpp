@@ -115,11 +115,11 @@ TEST(Backward, AStepThatThrowsLeavesTheLeavesUsable) {
 TEST(Backward, RefusesAGradientOfAnotherShape) {
   Variable x = parameter(Tensor::full({2}, 3)), loss = sum(x);
   x.mutable_grad() = Tensor::zeros({1});
-  EXPECT_REFUSAL("backward: the gradient of leaf expects [2], got [1]", backward(loss));
+  EXPECT_REFUSAL("backward: the gradient of input 0 of sum expects [2], got [1]", backward(loss));
   x.mutable_grad() = Tensor();
   loss = sum(x);
   loss.mutable_grad() = Tensor::zeros({0});
-  EXPECT_REFUSAL("backward: the gradient of sum expects [], got [0]", backward(loss));
+  EXPECT_REFUSAL("backward: the gradient of loss expects [], got [0]", backward(loss));
 }
 
 TEST(Trace, OnePerThread) {

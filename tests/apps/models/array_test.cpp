@@ -290,7 +290,7 @@ TEST_F(Array, CompanionsBelongToTheirOwnTable) {
   elsewhere.plate = "../unknown";
   write_recording(path("elsewhere.safetensors"), elsewhere);
   expect_exit(run("supertac-import elsewhere.safetensors --sensor mat.json --out none"), 1,
-              "expected a plate's name without '/'");
+              "recording: plate expects a name without '/', got '../unknown'");
   EXPECT_EQ(run("supertac-import log --sensor mat.json --truth-range 5,5 --out none").code, 2);
 }
 

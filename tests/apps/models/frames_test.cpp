@@ -130,7 +130,7 @@ TEST_F(Frames, OfOnePlateAreLeftOutByName) {
 TEST_F(Frames, AreRefusedWhereTheyDoNotFit) {
   const std::string train = "supertac-train --data data --out m.safetensors ";
   expect_exit(run(train + "--timesteps 1"), 2, "give --scaling fixed, or --preset frame");
-  expect_exit(run(train + "--preset frame --split trial"), 1, "has no trial; use split group");
+  expect_exit(run(train + "--preset frame --split trial"), 1, "expects a trial, got none; use split group");
   expect_exit(run(train + "--preset frame --split group --scale 2"), 1,
               "has a truth of 16x24 pixels, expected 8x12");
   expect_exit(run(train + "--pairs p"), 2, "pairs");

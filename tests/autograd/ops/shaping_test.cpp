@@ -68,8 +68,9 @@ TEST(Shaping, TakesTheLastFrameOfEachWindow) {
   EXPECT_VALUES(last_frame(x, 1, 2, 1).value(), {2, 1, 2, 1}, {2, 3, 12, 13});
   EXPECT_REFUSAL("last_frame: windows expects rank 3, got [2,4]", last_frame(zeros({2, 4}), 1, 2, 1));
   EXPECT_REFUSAL("last_frame: windows expects [2,2,1], got [2,2,2]", last_frame(x, 1, 1, 1));
-  EXPECT_REFUSAL("last_frame: windows expects one frame or more, got [2,0,2]",
-                 last_frame(zeros({2, 0, 2}), 1, 2, 1));
+  for (const Shape& empty : {Shape{2, 0, 2}, {2, 2, 0}})
+    EXPECT_REFUSAL("last_frame: windows expects [N,T,S] with T, S >= 1, got " + empty.text(),
+                   last_frame(zeros(empty), 1, 2, 1));
   EXPECT_REFUSAL("last_frame: windows expects a value, got an empty Variable",
                  last_frame(Variable(), 1, 2, 1));
   EXPECT_REFUSAL("last_frame: rows expects 1 to 2, got 4294967296",

@@ -230,6 +230,8 @@ TEST(BoardFrame, LayoutIsThatOfTheBoard) {
   BoardDecoder decoder;
   decoder.push(bytes, [](const DecodedFrame& found) { EXPECT_EQ(found.values[6], 0x0123 * (3.3F / 4096)); });
   EXPECT_EQ(decoder.frame(), frame);
+  frame.slip = 4096;
+  EXPECT_REFUSAL("write_frame: sample expects 0 to 4095, got 4096", frame_bytes(frame));
 }
 
 TEST(BoardFrame, EveryHighByteIsChecked) {

@@ -212,9 +212,11 @@ TEST_F(MapFiles, APictureIsWritten) {
 TEST_F(MapFiles, SaysWhatIsWrong) {
   EXPECT_ERROR(write_maps(path(".npy"), {small_map()}), std::invalid_argument,
                "a map is written as .png, .safetensors, .csv or .stl, found ");
-  EXPECT_ERROR(write_maps(path(".stl"), {small_map(), small_map()}), std::invalid_argument,
-               "of one surface, found 2");
-  EXPECT_ERROR(write_maps(path(".png"), {}), std::invalid_argument, "expected at least one, got none");
+  EXPECT_REFUSAL(
+      "write_maps: maps expects the surface of one plate for .stl, got 2; choose one plate, or write "
+      ".safetensors",
+      write_maps(path(".stl"), {small_map(), small_map()}));
+  EXPECT_REFUSAL("write_maps: maps expects 1 or more, got 0", write_maps(path(".png"), {}));
 }
 
 }  // namespace supertac::named_map_test

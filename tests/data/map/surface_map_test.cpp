@@ -126,11 +126,11 @@ TEST(SurfaceMap, SaysWhatIsWrong) {
   map.add(std::numeric_limits<double>::quiet_NaN(), 0, picture, errors);
   EXPECT_TRUE(map.empty());
   map.add(0, 0, picture, errors);
-  EXPECT_ERROR(map.add(0, 0, picture, {}), std::invalid_argument, "all with errors or all without");
-  EXPECT_ERROR(map.add(0, 0, std::vector<float>(4), {}), std::invalid_argument,
-               "expected pictures of 8x6 pixels");
+  EXPECT_REFUSAL("map: errors expects 48 values, got 0", map.add(0, 0, picture, {}));
+  EXPECT_REFUSAL("map: picture expects 48 values, got 4", map.add(0, 0, std::vector<float>(4), {}));
   EXPECT_ERROR(map.add(1e6, 1e6, picture, errors), std::runtime_error, "are positions in mm?");
-  EXPECT_ERROR(map.add(1e300, 0, picture, errors), std::runtime_error, "expected a position in mm");
+  EXPECT_ERROR(map.add(1e300, 0, picture, errors), std::runtime_error,
+               "map: position expects mm, got 1e+300, 0");
   std::vector<float> read(kGrid.pixels());
   map.read(500, 0, read);
   EXPECT_TRUE(std::isnan(read[0]));

@@ -56,10 +56,8 @@ TEST(Stl, TextIsReadWhateverItsSpacesAndCase) {
 }
 
 TEST(Stl, NothingIsWrittenThatIsTooLargeToBeRead) {
-  EXPECT_REFUSAL(
-      "stl_bytes: 10737418 triangles make a file of 536870984 bytes, expected at most 536870912; try a "
-      "coarser resolution",
-      stl_bytes(std::vector<Triangle>(kMaxStlBytes / 50), "title"));
+  EXPECT_REFUSAL("stl_bytes: triangles expects at most 10737416, got 10737418; try a coarser resolution",
+                 stl_bytes(std::vector<Triangle>(kMaxStlBytes / 50), "title"));
 }
 
 TEST(Stl, LengthTellsBinaryFromTextWhateverTheFirstWord) {

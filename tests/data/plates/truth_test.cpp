@@ -72,14 +72,10 @@ TEST(Truth, CoversEveryTaxelsSquareOfAnyArray) {
 
 TEST(Truth, RefusesAnImageOfTheWrongSize) {
   std::vector<float> image(255);
-  EXPECT_REFUSAL(
-      "truth_image: expected a picture of 1x1 pixels or more and room for all, got 16x16 pixels and room for "
-      "255",
-      truth_image(Plate::named("plain"), 0, 0, ImageGrid{}, image));
-  EXPECT_REFUSAL(
-      "truth_image: expected a picture of 1x1 pixels or more and room for all, got 0x0 pixels and room "
-      "for 0",
-      truth_image(Plate::named("plain"), 0, 0, {0, 0, 1}, {}));
+  EXPECT_REFUSAL("truth_image: image expects 256 values, got 255",
+                 truth_image(Plate::named("plain"), 0, 0, ImageGrid{}, image));
+  EXPECT_REFUSAL("truth_image: grid expects 1x1 pixels or more, got 0x0",
+                 truth_image(Plate::named("plain"), 0, 0, {0, 0, 1}, {}));
 }
 
 constexpr std::size_t kPixels = 64, kTruths = 200;

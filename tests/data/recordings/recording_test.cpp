@@ -107,7 +107,8 @@ TEST(Recording, RefusesAnArrayThatIsNone) {
       {R"({"rows": 4, "columns": 4, "channels": 1, "pitch_mm": [3]})",
        "metadata \"array\": \"pitch_mm\" must be a number, or [along a row, from row to row], found [3]"},
       {R"({"rows": 0, "columns": 4, "pitch_mm": 3, "channels": 1})",
-       "array: expected 1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm; got 0x4 taxels "
+       "array: layout expects 1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm, got 0x4 "
+       "taxels "
        "at 3 mm"}};
   for (const auto& [array, refusal] : kArrays) {
     Parts parts;
@@ -155,7 +156,7 @@ TEST(Recording, IsNeitherWrittenNorReadThatBreaksARule) {
     Recording recording = example();
     recording.metadata[member] = "4x4";
     EXPECT_REFUSAL(
-        "write_recording: the metadata field '" + member + "' is a member of the recording; set it there",
+        "write_recording: metadata expects no member of the recording, got '" + member + "'; set it there",
         write_recording(folder.file("a"), recording));
   }
   Recording recording = example();

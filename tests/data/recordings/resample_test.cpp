@@ -124,6 +124,10 @@ TEST(Resample, RefusesWhatBreaksARuleOfRecordings) {
   recording.signals[40 * rig::kTaxels + 3] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_ERROR(resample(recording, kWideRange), std::runtime_error,
                "recording: signals are not finite at frame 40, taxel 3; record or import the pass again");
+  EXPECT_REFUSAL(
+      "resample: rate_hz expects at most 64 samples for each recorded frame, got 1e+06 Hz; the model is of "
+      "another sensor",
+      resample(make_recording({}), {.rate_hz = 1e6}));
 }
 
 // One long recording whose signals run evenly from low to high.

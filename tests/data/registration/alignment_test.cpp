@@ -152,7 +152,7 @@ TEST(Alignment, AFlatPassAmongOthersIsLeftAlone) {
 TEST(Alignment, AnotherArrayIsRefused) {
   std::vector<Pass> passes = simulated_passes("6_Bumps");
   passes[1].recording.array.pitch_mm = 2;
-  EXPECT_REFUSAL("align_passes: expected recordings of the rig's 4x4 taxels at 3 mm, got 4x4 taxels at 2 mm",
+  EXPECT_REFUSAL("align_passes: recording expects the rig's 4x4 taxels at 3 mm, got 4x4 taxels at 2 mm",
                  align(passes));
 }
 

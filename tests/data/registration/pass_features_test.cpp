@@ -45,7 +45,7 @@ TEST(Contacts, IgnoresNoiseAndFlatSignals) {
 TEST(Contacts, RefusesAnEndlessRecording) {
   Recording recording = dips({1.5}, 0.1);
   recording.time_s.back() = 1e9;
-  EXPECT_REFUSAL("find_contacts: time stamps must increase and span at most 10000 s, got a span of 1e+09 s",
+  EXPECT_REFUSAL("find_contacts: time_s expects a span of more than 0 and at most 10000 s, got 1e+09 s",
                  find_contacts(recording));
 }
 

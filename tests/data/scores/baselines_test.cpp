@@ -154,12 +154,12 @@ TEST(Baselines, ASignalThatNeverChangesGivesTheMean) {
 
 TEST(Baselines, NeedWindowsToFitToAndTheirSizes) {
   const WindowSet set = surface_windows(0.2, 0.5);
-  EXPECT_REFUSAL("baseline: there is no example to fit to", fit_baselines(set, {}));
-  EXPECT_REFUSAL("baseline: there is no example to fit to", ridge(set, {}));
+  EXPECT_REFUSAL("baseline: train expects a window or more, got none", fit_baselines(set, {}));
+  EXPECT_REFUSAL("baseline: train expects a window or more, got none", ridge(set, {}));
   std::vector<float> out(256), small(64);
   for (const Baseline& baseline : fit_baselines(set, all_of(set))) {
     EXPECT_REFUSAL(baseline.name == "ridge" ? "baseline: window expects 256 values, got 15"
-                                            : "baseline: an input is [T][16], got 15 values",
+                                            : "baseline: window expects [T][16], got 15 values",
                    baseline.predict(std::vector<float>(15), out));
     EXPECT_REFUSAL("baseline: image expects 256 values, got 64", baseline.predict(set.raw_window(0), small));
   }

@@ -167,7 +167,7 @@ TEST(MetricsAccumulator, RefusesValuesThatAreNotFinite) {
   ScoredPairs metrics;
   Image output = flat(0);
   output[7] = std::nanf("");
-  EXPECT_REFUSAL("metrics: output pixel 7 is not finite", metrics.add(output, flat(0)));
+  EXPECT_REFUSAL("metrics: output pixel 7 expects a finite number, got nan", metrics.add(output, flat(0)));
   EXPECT_EQ(metrics.result().windows, 0U);
 }
 

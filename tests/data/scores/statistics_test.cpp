@@ -43,10 +43,11 @@ TEST(BootstrapInterval, DrawsPassesWithinTheirPlate) {
 
 TEST(BootstrapInterval, RefusesNothing) {
   const ClusterCount empty[] = {{1, 2}, {0, 0}};
-  EXPECT_REFUSAL(
-      "bootstrap_interval: expected a cluster at least, and a stratum for each or none, got 0 and 0",
-      bootstrap_interval(std::span<const ClusterCount>()));
-  EXPECT_REFUSAL("bootstrap_interval: expected clusters with a total above 0, got 0",
+  const std::size_t stratum[] = {0};
+  EXPECT_REFUSAL("bootstrap_interval: clusters expects 1 or more, got 0",
+                 bootstrap_interval(std::span<const ClusterCount>()));
+  EXPECT_REFUSAL("bootstrap_interval: strata expects 2 values, got 1", bootstrap_interval(empty, stratum));
+  EXPECT_REFUSAL("bootstrap_interval: total of a cluster expects more than 0, got 0",
                  bootstrap_interval(empty));
 }
 
@@ -85,8 +86,8 @@ TEST(SignFlip, RejectsATrueHypothesisAsOftenAsItSays) {
 }
 
 TEST(SignFlip, RefusesNothingAndWhatIsNoNumber) {
-  EXPECT_REFUSAL("sign_flip_p: expected at least one difference, got none", sign_flip_p({}));
-  EXPECT_REFUSAL("sign_flip_p: expected finite differences, got inf",
+  EXPECT_REFUSAL("sign_flip_p: differences expects 1 or more, got 0", sign_flip_p({}));
+  EXPECT_REFUSAL("sign_flip_p: differences expects finite numbers, got inf",
                  sign_flip_p(std::vector<double>{1, std::numeric_limits<double>::infinity()}));
 }
 

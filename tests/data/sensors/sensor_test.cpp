@@ -89,7 +89,8 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
   gains[3] = 0;
   const std::string
       pitch = "\"pitch_mm\" must be a number, or [along a row, from row to row], found ",
-      array = "array: expected 1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm; got ";
+      array =
+          "array: layout expects 1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm, got ";
   const std::tuple<const char*, Json, std::string> cases[] = {
       {"rows", 65, array + "65x4 taxels at 5 mm"},
       {"pitch_mm", Json::array({4}), pitch + "[4]"},

@@ -122,12 +122,11 @@ TEST(Presses, ThreeAxesLeanAndRestInTheMiddle) {
   EXPECT_LT(low, 0.4);
   EXPECT_GT(high, 0.6);
   tip.array.channels = 2;
+  EXPECT_REFUSAL("presses: array expects one channel or three axes, got 3x3 taxels at 8 mm with 2 channels",
+                 simulate_presses(tip, {}, 1));
   EXPECT_REFUSAL(
-      "presses: expected an array of one channel or three axes, got 3x3 taxels at 8 mm with 2 channels",
-      simulate_presses(tip, {}, 1));
-  EXPECT_REFUSAL(
-      "presses: expected a kind of object (disc, bar, ring, edge, letter, fingertip, mixed, surface1, "
-      "surface2, surface3, surface4, surface5, surface6, surface7), got 'cat'",
+      "presses: kind expects one of disc, bar, ring, edge, letter, fingertip, mixed, surface1, surface2, "
+      "surface3, surface4, surface5, surface6, surface7, got 'cat'",
       simulate_presses(mat(), {.kind = "cat"}, 1));
 }
 

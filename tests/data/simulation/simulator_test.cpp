@@ -95,7 +95,7 @@ TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
     EXPECT_TRUE(std::isfinite(v));
   settings.array.channels = 2;
   EXPECT_REFUSAL(
-      "simulator: expected an array of one channel or three axes, got 16x16 taxels at 5 mm with 2 channels",
+      "simulator: array expects one channel or three axes, got 16x16 taxels at 5 mm with 2 channels",
       simulate_pass(plate, {}, settings));
 }
 
@@ -243,15 +243,19 @@ TEST(Simulator, LossLeavesGapsInTheStampsNotInTheOrder) {
 
 TEST(Simulator, RefusesImpossiblePasses) {
   const Plate plate = Plate::named("plain");
-  const std::string path =
-      "speed and rate must be positive and the slide lie on the plate (0..108 mm); got speed ";
-  const std::pair<PassSettings, std::string> cases[] = {
-      {{.speed_mm_s = 0}, path + "0 mm/s, rate 300 Hz, slide from 0 to 108 mm"},
-      {{.from_mm = 80, .to_mm = 28}, path + "10 mm/s, rate 300 Hz, slide from 80 to 28 mm"},
-      {{.to_mm = 120}, path + "10 mm/s, rate 300 Hz, slide from 0 to 120 mm"},
-      {{.pass = 9}, "expected pass 1..8 and trial >= 1, got pass 9, trial 1"}};
-  for (const auto& [pass, refusal] : cases)
-    EXPECT_REFUSAL("simulate_pass: " + refusal, simulate_pass(plate, pass));
+  const std::tuple<PassSettings, double, std::string> cases[] = {
+      {{.speed_mm_s = 0}, 300, "speed_mm_s expects a finite number above 0, got 0"},
+      {{}, -1, "rate_hz expects a finite number above 0, got -1"},
+      {{.from_mm = -1}, 300, "from_mm expects 0 to below 108, got -1"},
+      {{.from_mm = 80, .to_mm = 28}, 300, "to_mm expects above from_mm, 80, to 108, got 28"},
+      {{.to_mm = 120}, 300, "to_mm expects above from_mm, 0, to 108, got 120"},
+      {{.pass = 9}, 300, "pass expects 1 to 8, got 9"},
+      {{.trial = 0}, 300, "trial expects 1 or more, got 0"}};
+  SimulatorSettings settings;
+  for (const auto& [pass, rate_hz, refusal] : cases) {
+    settings.rate_hz = rate_hz;
+    EXPECT_REFUSAL("simulate_pass: " + refusal, simulate_pass(plate, pass, settings));
+  }
 }
 
 TEST(FingerModel, TheMountLiftsTheOtherRowsOffThePlate) {

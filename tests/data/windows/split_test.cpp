@@ -57,7 +57,7 @@ WindowSet set_of_people(int passes, int people) {
 TEST(SplitKind, HasANameBothWays) {
   for (const char* name : {"window", "pass", "trial", "texture", "group", "none"})
     EXPECT_EQ(name_of(split_kind(name)), name);
-  EXPECT_REFUSAL("split: expects window, pass, trial, texture, group or none, got 'trails'",
+  EXPECT_REFUSAL("split: name expects window, pass, trial, texture, group or none, got 'trails'",
                  split_kind("trails"));
 }
 
@@ -118,7 +118,7 @@ TEST(Split, TextureLeavesOutTheNamedPlatesAndTheirLikes) {
     const Split split = make_split(set, SplitKind::texture, 7, leave_out);
     EXPECT_EQ(plates_of(set, split.test), std::set<std::string>(leave_out.begin(), leave_out.end()));
     EXPECT_EQ(plates_of(set, split.train), train);
-    EXPECT_REFUSAL("split texture: the data has no windows of plate '6_Blob' to leave out",
+    EXPECT_REFUSAL("split texture: leave_out expects a plate with windows in the data, got '6_Blob'",
                    make_split(set, SplitKind::texture, 7, {"6_Blob"}));
   }
 }
@@ -150,17 +150,19 @@ TEST(Split, SaysWhatTheDataLacks) {
   const auto message = [&](SplitKind kind, const std::vector<std::string>& leave_out = {}) {
     return what_of<std::invalid_argument>([&] { make_split(set, kind, 1, leave_out); });
   };
-  EXPECT_EQ(
-      message(SplitKind::pass),
-      "split pass: plate 'bumps12' has one pass with windows, needs two: one to train on, one to test on");
-  EXPECT_EQ(
-      message(SplitKind::trial),
-      "split trial: no window to test on; the data needs trials 1 and 2; split pass or group does without");
+  EXPECT_EQ(message(SplitKind::pass),
+            "split pass: passes with windows over 'bumps12' expects two, one to train on, one to test on, "
+            "got 1");
+  EXPECT_EQ(message(SplitKind::trial),
+            "split trial: windows expects one or more to test on, got none; the data needs trials 1 and 2; "
+            "split pass or group does without");
   EXPECT_EQ(message(SplitKind::texture),
-            "split texture: the data has 1 plate, needs two: one to train on, one to test on");
+            "split texture: plates expects two, one to train on, one to test on, got 1");
   EXPECT_EQ(message(SplitKind::texture, {"bumps12"}),
-            "split texture: no window to train on; the data has nothing unlike what is left out: train "
-            "beside random plates, score with split none");
+            "split texture: windows expects one or more to train on, got none; the data has nothing unlike "
+            "what is left out: train beside random plates, score with split none");
+  EXPECT_REFUSAL("split window: windows expects two, one to train on, one to test on, got 0",
+                 make_split(WindowSet(wide_settings(16)), SplitKind::window, 1));
   EXPECT_EQ(message(SplitKind::window), "nothing thrown");
 }
 
@@ -221,7 +223,8 @@ TEST(Split, TrialTestsAllTrialsButTheFirst) {
   EXPECT_EQ(count_overlapping(set, split), 0U);
   set.add(make_recording({.trial = 0, .pass = 7, .frames = 30}));
   EXPECT_REFUSAL(
-      "split trial: pass 7 over 'bumps12' has no trial; use split group or pass, or record it with one",
+      "split trial: pass 7 over 'bumps12' expects a trial, got none; use split group or pass, or record it "
+      "with one",
       make_split(set, SplitKind::trial, 0));
 }
 
@@ -251,13 +254,14 @@ TEST(Split, GroupKeepsGroupsTogether) {
   EXPECT_EQ(groups_of(set, named.test), (std::set<std::string>{"person 2", "person 4"}));
   EXPECT_EQ(named.test.size() + named.train.size(), set.size());
   EXPECT_REFUSAL(
-      "split group: the data has no group 'person 9' to leave out; it has person 0, person 1, person 2, "
-      "person 3, person 4",
+      "split group: leave_out expects one of person 0, person 1, person 2, person 3, person 4, got 'person "
+      "9'",
       make_split(set, SplitKind::group, 3, {"person 9"}));
   set.add(make_recording({.pass = 21, .frames = 30}));
   EXPECT_REFUSAL(
-      "split group: every recording needs metadata 'group' and there must be two groups, one to train "
-      "on, one to test on; some have none: use split pass",
+      "split group: metadata 'group' expects every recording to have it, and two groups, one to train on, "
+      "one "
+      "to test on, got recordings without: use split pass",
       make_split(set, SplitKind::group, 3));
 }
 

@@ -94,8 +94,8 @@ TEST(NormaliseWindow, RefusesWhatIsNoWindow) {
   for (const auto& [values, taxels] :
        {std::pair(7, 2), {7, 0}, {0, 2}, {65'536, 1}}) {  // counts would not fit
     std::vector<float> x(static_cast<std::size_t>(values));
-    EXPECT_REFUSAL("normalise_window: a window is [T][" + std::to_string(taxels) + "], T up to 65535, got " +
-                       std::to_string(values) + " values",
+    EXPECT_REFUSAL("normalise_window: window expects [T][" + std::to_string(taxels) +
+                       "] with T from 1 to 65535, got " + std::to_string(values) + " values",
                    normalise_window(x, static_cast<std::size_t>(taxels)));
   }
 }
@@ -216,7 +216,7 @@ TEST(Augment, RefusesNegativeMagnitudes) {
   EXPECT_EQ(message({.dropped = 17}), "augmentation: dropped expects 0 to 16, got 17");
   EXPECT_EQ(message({.dropped = -1}), "augmentation: dropped expects 0 to 16, got -1");
   std::vector<float> window(17);
-  EXPECT_REFUSAL("augment: a window of 4x4 taxels at 3 mm is [T][16], got 17 values",
+  EXPECT_REFUSAL("augment: window expects [T][16] of 4x4 taxels at 3 mm, got 17 values",
                  augment({.gain = 1}, 1, 1, window));
   EXPECT_NO_THROW(check(AugmentSettings{}));
 }
@@ -244,7 +244,7 @@ TEST(Augment, AnyArray) {
   std::vector<float> window(array.signals());
   EXPECT_REFUSAL("augmentation: dropped expects 0 to 15, got 16",
                  augment({.dropped = 16}, 1, 1, window, array));
-  EXPECT_REFUSAL("augment: a window of 3x5 taxels at 3 mm with 3 channels is [T][45], got 44 values",
+  EXPECT_REFUSAL("augment: window expects [T][45] of 3x5 taxels at 3 mm with 3 channels, got 44 values",
                  augment({.gain = 1}, 1, 1, std::span(window).first(44), array));
 }
 

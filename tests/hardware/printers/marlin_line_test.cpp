@@ -55,10 +55,11 @@ TEST(MarlinLine, NoSingleDamagedByteIsAnEmergency) {
 }
 
 TEST(MarlinLine, RefusesWhatMarlinWouldCut) {
-  EXPECT_ERROR(numbered_line(1, std::string(96, 'X')), std::invalid_argument,
-               "bytes, Marlin takes at most 96");
-  EXPECT_ERROR(numbered_line(1, "G1 X1\nG1 X2"), std::invalid_argument,
-               "a command may not hold a line break or '*', got 'G1 X1?G1 X2'");
+  EXPECT_REFUSAL("marlin line: command expects a line of at most 96 bytes, got 103 for '" +
+                     std::string(60, 'X') + "...'",
+                 numbered_line(1, std::string(96, 'X')));
+  EXPECT_REFUSAL("marlin line: command expects neither a line break nor '*', got 'G1 X1?G1 X2'",
+                 numbered_line(1, "G1 X1\nG1 X2"));
   EXPECT_ERROR(numbered_line(1, "G1*3"), std::invalid_argument, "got 'G1*3'");
 }
 

@@ -36,8 +36,10 @@ TEST(Palpation, TheWholeWayIsCheckedBeforeTheFirstMove) {
   ReadyBench bench;
   EXPECT_ERROR(run_palpation(bench.printer, {.passes = 40}), OutsideLimits,
                "beside the plate; nothing was sent, lift first");  // only the last passes leave the plate
-  EXPECT_ERROR(run_palpation(bench.printer, {.passes = 0}), std::invalid_argument,
-               "expected 1 to 1000 passes");
+  EXPECT_REFUSAL(
+      "palpation: plan expects 1 to 1000 passes, and slide, lift and speed above 0, got 0 passes, a slide of "
+      "108 mm, a lift of 5 mm and 10 mm/s",
+      run_palpation(bench.printer, {.passes = 0}));
   EXPECT_ERROR(run_palpation(bench.printer, {.speed = INFINITY}), std::invalid_argument,
                "slide, lift and speed above 0");
   EXPECT_TRUE(moves_of(bench.firmware()).empty());

@@ -250,16 +250,22 @@ TEST(SafetensorsWrite, RefusesWhatItCouldNotReadBack) {
   TemporaryFolder folder;
   const std::vector<std::byte> data(4);
   using Metadata = std::map<std::string, std::string>;
+  Metadata full;
+  for (int i = 0; i < 4095; ++i) full[std::to_string(i)];
   const std::tuple<Metadata, std::vector<TensorToWrite>, std::string> cases[] = {
-      {{}, {{"a", "F32", {2}, data}}, "has 4 bytes, its shape and type need 8"},
-      {{}, {{"a", "X", {2}, data}}, "unknown type 'X'"},
-      {{}, {{"a", "F32", {1}, data}, {"a", "F32", {1}, data}}, "taken"},
-      {{}, {{"__metadata__", "F32", {1}, data}}, "taken"},
-      {{{"checksum", ""}}, {}, "'checksum' is written by this function"},
-      {{{"a", "\xff"}}, {}, "UTF-8"},
-      {{{"a", std::string(1 << 20, 'x')}}, {}, "expected at most 1048576"}};
-  for (const auto& [metadata, tensors, part] : cases)
-    EXPECT_ERROR(write_safetensors(folder.file("a"), metadata, tensors), std::invalid_argument, part);
+      {full, {}, "metadata expects at most 4094 fields, got 4095"},
+      {{}, std::vector<TensorToWrite>(8193), "tensors expects at most 8192, got 8193"},
+      {{}, {{"a", "F32", {2}, data}}, "tensor 'a' expects 8 bytes, got 4"},
+      {{},
+       {{"a", "X", {2}, data}},
+       "tensor 'a' expects a known type, rank <= 16, below 2^64 bytes, got 'X' [2]"},
+      {{}, {{"a", "F32", {1}, data}, {"a", "F32", {1}, data}}, "tensors expects names not taken, got 'a'"},
+      {{}, {{"__metadata__", "F32", {1}, data}}, "tensors expects names not taken, got '__metadata__'"},
+      {{{"checksum", ""}}, {}, "metadata expects no field that this function writes, got 'checksum'"},
+      {{{"a", "\xff"}}, {}, "names and metadata expects valid UTF-8, got other bytes"},
+      {{{"a", std::string(1 << 20, 'x')}}, {}, "header expects at most 1048576 bytes, got 1048648"}};
+  for (const auto& [metadata, tensors, refusal] : cases)
+    EXPECT_REFUSAL("write_safetensors: " + refusal, write_safetensors(folder.file("a"), metadata, tensors));
   EXPECT_EQ(folder.entries(), 0u);
 }
 

@@ -46,14 +46,15 @@ TEST(PanelGrid, DrawsYUpwardsAndXToTheRight) {
   EXPECT_EQ(picture.at(4, 4), colour_of(0.25F));
   EXPECT_EQ(picture.at(1, 1), colour_of(0.5F));
   EXPECT_EQ(picture.at(3, 2), colour_of(1));
-  EXPECT_ERROR(panel_grid(std::vector<PanelValues>{{values, 3, 2}}, 1, 4), std::invalid_argument,
-               "expects 3 x 2 values, got 4");
+  EXPECT_REFUSAL("panel_grid: panel expects 6 values, got 4",
+                 panel_grid(std::vector<PanelValues>{{values, 3, 2}}, 1, 4));
 }
 
 TEST(Picture, HasSidesOf1To65535Pixels) {
   EXPECT_EQ(Picture(65535, 1).rgb.size(), 3u * 65535);
   EXPECT_THROW(Picture(65536, 1), std::invalid_argument);
-  EXPECT_THROW(Picture(1, 0), std::invalid_argument);
+  EXPECT_REFUSAL("picture: sides expects 1 to 65535 pixels, got 1x0; draw fewer windows or smaller panels",
+                 Picture(1, 0));
 }
 
 TEST(PanelGrid, FillsRowsFromTheTopAndLeavesWhatHasNoValuesEmpty) {
@@ -80,11 +81,11 @@ TEST(PanelGrid, KeepsTheShapeOfTheArray) {
 }
 
 TEST(PanelGrid, RefusesNothingAndTooMuch) {
-  EXPECT_ERROR(panel_grid({}, 3, 16), std::invalid_argument, "there is no panel to draw");
+  EXPECT_REFUSAL("panel_grid: panels expects 1 or more, got 0", panel_grid({}, 3, 16));
   const std::vector<float> values(256);
   EXPECT_THROW(panel_grid(std::vector<PanelValues>(2000, {values, 16, 16}), 2000, 64), std::invalid_argument);
-  EXPECT_ERROR(panel_grid(std::vector<PanelValues>{{values, 16, 16}}, 1, 15), std::invalid_argument,
-               "panels of 15 pixels cannot show more values a side, got 16");
+  EXPECT_REFUSAL("panel_grid: side expects 16 pixels or more, one for a value, got 15",
+                 panel_grid(std::vector<PanelValues>{{values, 16, 16}}, 1, 15));
 }
 
 TEST(Png, ReadsBackAsDrawn) {
