@@ -125,9 +125,9 @@ struct RegisteredPass {
 /// six rounds over all passes. The medians of a and b over the passes are subtracted in each round, so that
 /// the plate as a whole stays where the registrations put it.
 ///
-/// A pass that agrees badly (correlation of 0.5 to 0.9) is tried with frames lost at one place: 0.1 to 0.8 s, at
-/// every 0.2 s. Where the signals stand still such a loss leaves no step for find_lost_frames() to see. It is
-/// accepted when the correlation rises by 0.05, and all passes are aligned once more.
+/// A pass that agrees badly (correlation of 0.5 to 0.9) is tried with frames lost at one place: 0.1 to 0.8 s,
+/// at every 0.2 s. Where the signals stand still such a loss leaves no step for find_lost_frames() to see. It
+/// is accepted when the correlation rises by 0.05, and all passes are aligned once more.
 ///
 /// Passes that are not reliable take no part; with fewer than three nothing changes, nor does a pass whose
 /// correlation stays below a half. Sets start_mm, rate, shift_mm, stretch_mm, lost_at_s, lost_s and agreement
