@@ -10,7 +10,8 @@
    Link with `pkg-config --cflags --libs supertac`, or find_package(supertac) and supertac::c. Functions that
    can fail return NULL or -1, and supertac_error() then says in one line what was wrong. Nothing is printed,
    and no exception leaves the library. In a child by fork() the thread that forked works alone.
-   The pictures have the same bits as those of the programs, on every processor and with any number of threads. */
+   The pictures have the same bits as those of the programs, on every processor and with any number of
+   threads. */
 #ifndef SUPERTAC_H
 #define SUPERTAC_H
 
@@ -80,8 +81,8 @@ SUPERTAC_API supertac_live* supertac_live_new(const supertac_model* model, doubl
 SUPERTAC_API void supertac_live_free(supertac_live* live);
 
 /* One frame [signals], row by row, in the sensor's unit; time_s is the sensor's clock. 0, or -1 for a null
-   pointer. A frame that is not finite, or not later than the one before, is left out; where time steps back by
-   more than a gap, the window begins anew. */
+   pointer. A frame that is not finite, or not later than the one before, is left out; where time steps back
+   by more than a gap, the window begins anew. */
 SUPERTAC_API int supertac_live_push(supertac_live* live, double time_s, const float* frame);
 
 /* The picture that ends with the newest frame, and its predicted error unless that is NULL. 1: written; 0:
