@@ -220,8 +220,8 @@ int run(Arguments& a) {
     throw std::runtime_error(origin + ": no frame came; supertac-stream --probe says what does");
   if (stream.pictures() == 0 && !interrupted()) {
     throw std::runtime_error(
-        origin + ": no picture, expected " + format(stream.window_s(), 2) +
-        " s of signal without a gap of 0.05 s, found " + std::to_string(stream.gaps()) +
+        origin + ": no picture, expected " + format(stream.window_s(), 2) + " s of signal without a gap of " +
+        format(longest_silence_s(source->period_s()), 2) + " s, found " + std::to_string(stream.gaps()) +
         (stream.gaps() > 0 ? " gaps" + stream.rate_remark() : " gaps; stream for longer"));
   }
   return kExitOk;

@@ -100,9 +100,10 @@ class Repetition {
     }
     if (trainer_.step() % trainer_.steps_per_epoch() == 0) end_epoch(trainer_, task_);
     line_ = writer_->after_step();
-    if (!line_) return std::nullopt;
-    const std::optional<LedgerLine> theirs = ledger_.at(line_->step);
-    if (!theirs) return LedgerDifference{before, line_->step, "a line that is missing", false};
+    const std::optional<LedgerLine> theirs = ledger_.at(trainer_.step());
+    if (!line_ && !theirs) return std::nullopt;
+    if (!line_) return LedgerDifference{before, trainer_.step(), "a line too many", false};
+    if (!theirs) return LedgerDifference{before, trainer_.step(), "a line that is missing", false};
     return difference(ledger_, *theirs, *line_);
   }
   /// start() and steps up to segment.to, with a progress bar, or to the first difference.
@@ -110,10 +111,20 @@ class Repetition {
     auto d = start(segment.from);
     const std::int64_t from = trainer_.step();
     Progress progress(a, "repeating", static_cast<std::uint64_t>(segment.to - from), "steps");
-    for (; !d && trainer_.step() < segment.to;
+    for (; !d && trainer_.step() < segment.to && !trainer_.done();
          progress.update(static_cast<std::uint64_t>(trainer_.step() - from)))
       d = make_step();
+    if (!d && (trainer_.step() < segment.to || (segment.to == end_ && !trainer_.done())))
+      d = LedgerDifference{trainer_.step(), segment.to, "where it ends", false};
     return d;
+  }
+  /// Whether the state that was kept at the trainer's step says the same of the best epoch.
+  bool same_best() const {
+    const auto entries = trainer_.best_entries();
+    if (entries.empty()) return true;
+    const auto kept = SafetensorsFile::read(LedgerFile::state_path(folder_, trainer_.step()));
+    return std::ranges::all_of(
+        entries, [&](const auto& entry) { return value_or(kept.metadata(), entry.first) == entry.second; });
   }
   /// The line that the last step gave, if any.
   const std::optional<LedgerLine>& line() const { return line_; }
@@ -185,15 +196,19 @@ int check_training(const Arguments& a) {
     wrong += d.has_value();
     rows.push_back(std::move(row));
   };
-  for (const Segment& s : chosen)
-    say("steps " + std::to_string(s.from) + " to " + std::to_string(s.to) + ": ", training.repeat(s, a),
+  for (const Segment& s : chosen) {
+    auto d = training.repeat(s, a);
+    if (!d && !training.same_best()) d = LedgerDifference{s.from, s.to, "the best epoch", false};
+    say("steps " + std::to_string(s.from) + " to " + std::to_string(s.to) + ": ", d,
         {{"from", s.from}, {"to", s.to}});
+  }
   auto last = training.start(training.end());
-  if (!last && !trainer.done()) last = LedgerDifference{trainer.step(), trainer.step(), "the end", false};
+  if (!last && !trainer.done())
+    last = LedgerDifference{trainer.step(), trainer.step(), "where it ends", false};
   trainer.use_best();
   if (!last && !is_of(model, trainer.model()))
     last = LedgerDifference{trainer.step(), trainer.step(), "the model's file", false};
-  say("the model against the last state: ", last, {{"model", model}});
+  say("the model against what was kept at the end: ", last, {{"model", model}});
   a.print(std::to_string(chosen.size()) + " of " + std::to_string(all.size()) + " segments repeated, " +
           std::to_string(wrong) + " differences");
   a.write_json(

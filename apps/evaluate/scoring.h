@@ -113,9 +113,9 @@ class TrustScores {
 /// known belong to no map.
 class MapScores {
  public:
-  /// `model`: whose intervals the maps have; both must outlive this. `kinds`: of the elements, where that is
-  /// stated (kinds_of_elements()), else empty: pictures are then read back from what the maps are with
-  /// elements of the kind among these that each resembles most.
+  /// `model`: whose intervals the maps have, without a load; both must outlive this. `kinds`: of the
+  /// elements, where that is stated (kinds_of_elements()): pictures are then read back from the maps with
+  /// elements of the kind among these that each resembles most. Empty: from the maps as they are.
   MapScores(const WindowSet& windows, const ModelFile& model, std::vector<Plate> kinds);
   /// Windows of a pass come in the order of time.
   void add(const Drawn& drawn);

@@ -84,8 +84,8 @@ class Stream {
   /// PictureLog and WebServer.
   Stream(const StreamSettings& settings, std::span<const ModelFile> models, SensorSource& source);
 
-  /// Until the source ends, `seconds` are over, or a signal comes. What is recorded passes as fast as it
-  /// happened where somebody watches, else as fast as it can.
+  /// Until the source ends, `seconds` are over, or the program is interrupted. What is recorded passes as
+  /// fast as it happened where somebody watches, else as fast as it can.
   void run();
   /// Writes the files, ends the source, and tells the page what became of the run: `failure`, or that it is
   /// done when that is empty.

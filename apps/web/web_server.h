@@ -24,7 +24,8 @@ struct WebSite {
   /// GET /events, server-sent: first an event "hello" with this JSON object, to which "token" is added; an
   /// event "still" each second until there are news ...
   std::function<std::string()> hello;
-  /// ... then the newest of these JSON texts, at most 30 a second; an empty text: there is nothing new.
+  /// ... then the newest of these JSON texts, at most 30 a second, and again each second without another; an
+  /// empty text: there is nothing new.
   std::function<std::string()> news;
   /// POST /NAME does what its name says and answers with a line for people.
   std::map<std::string, std::function<std::string()>, std::less<>> actions;

@@ -10,6 +10,8 @@
 
 namespace supertac::kernels {
 
+/// Gradients: where it says = below, a Slot may say += instead.
+
 /// The sum of (x - target)^2 over n elements.
 inline double squared_error(Dim n, const real* x, const real* target) {
   return sum_of(n, [=](Dim i) {

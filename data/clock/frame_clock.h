@@ -214,7 +214,7 @@ class FrameClock {
   double period_s() const { return measured_s_; }
 
  private:
-  double level(const ReadEnd& burst) const { return burst.level_s(rate_.period_s); }
+  double level(const ReadEnd& read) const { return read.level_s(rate_.period_s); }
   double jitter_s() const;
   void take(double first, double last, double time_s);
   const ReadEnd& lowest() const;
@@ -229,8 +229,8 @@ class FrameClock {
   Rate rate_;
   double measured_s_;
   DeviceStamps stamps_;
-  std::deque<ReadEnd> window_;  // the newest bursts: frames that came in one read, or waited for one
-  std::vector<ReadEnd> ends_;   // bursts that have left it, for the rate
+  std::deque<ReadEnd> window_;  // the newest reads: frames that came in one, or waited for it
+  std::vector<ReadEnd> ends_;   // reads that have left it, for the rate
   std::uint64_t ended_ = 0, lost_ = 0, damaged_ = 0, resets_ = 0;
   double number_ = 0, believed_s_ = 0, arrived_s_ = 0;
   double level_s_ = 0, level_last_ = 0;

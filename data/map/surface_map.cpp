@@ -14,8 +14,8 @@
 namespace supertac {
 namespace {
 
-constexpr double kStandingMm = 1e-3, kMemory = 0.25, kJump = 0.5,  // shares of the side
-    kLeastError = 0.01;
+constexpr double kStandingMm = 1e-3, kLeastError = 0.01;
+constexpr double kMemory = 0.25, kJump = 0.5;  // shares of the side
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 // A value between pixels: the sum over t = 0..3 of weight[t] * pixel[n + first + t].

@@ -93,7 +93,7 @@ struct Track {
   std::vector<std::uint32_t> recorded;  ///< [frames]: the recorded frame nearest in time, whose truth it has
   std::vector<std::uint32_t>
       run;               ///< [frames]: frames since the pass began or since the last gap, itself included
-  std::size_t held = 0;  ///< frames for which no sample arrived: they repeat the one before
+  std::size_t held = 0;  ///< samples for which no frame arrived: they repeat the one before
   std::size_t gaps = 0;  ///< places where the recording is interrupted: longest_silence_s()
   std::size_t frames() const { return run.size(); }
 };

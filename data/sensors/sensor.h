@@ -77,7 +77,7 @@ struct FrameFormat {
   bool big_endian = false;
   std::string type = "u16";             ///< "u8", "i8", "u16", "i16", "u32", "i32" or "f32"
   std::vector<FrameField> fields = {};  ///< empty: time, where there is one, and all values
-  /// Of text: hexadecimal at the line's end, of what stands before it, or "hex", unknown.
+  /// Text has it in hexadecimal at the line's end, for what stands before it; "hex" is one that is unknown.
   std::string checksum = "none";  ///< one of kChecksums
   std::optional<std::size_t> checksum_from =
       {};  ///< the frame's first byte that it covers; else behind header

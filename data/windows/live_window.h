@@ -31,6 +31,7 @@ struct LiveWindowSettings {
 /// one window, and of the frames that the average is over.
 class LiveWindow {
  public:
+  /// The settings are those of a model, or checked as WindowSettings are.
   explicit LiveWindow(const LiveWindowSettings& settings);
 
   /// A frame with a signal or a time that is not finite is taken as lost, one that is not later than the one

@@ -31,7 +31,7 @@ void add_random_passes(WindowSet& windows, const RandomPasses& passes);
 ///   x_k(t) = level_k + drift_k t + noise,
 /// with levels from nothing to the whole range, drifts of up to a tenth of it in a window and noise of up to
 /// a twentieth, all drawn for each pass. They have a tenth as many windows as there are already, 2,400 at
-/// most unless `many`: with other_fingers, where a faint signal may be a texture, the whole tenth, and those
+/// most unless `many`: where fingers differ and a faint signal may be a texture, the whole tenth, and those
 /// beyond 2,400 are of a finger that hardly touches. Without them networks drew textures on signals that
 /// stand, drift or are noisy (bench/results/sensor_faults.md): normalised windows show one finger's noise as
 /// large as another's texture. For training only, like random passes, and not in_distribution(): an alarm

@@ -67,7 +67,7 @@ class SensorReader {
   std::optional<ReadFrame> next(double wait_s);
   /// Rethrows what ended the reader, without waiting and without taking frames.
   void check();
-  /// The source is at its end and all frames have been taken.
+  /// The source is at its end, without an error, and all frames have been taken.
   bool ended() const;
   bool live() const { return live_; }
   /// How long a live sensor may say nothing (s).

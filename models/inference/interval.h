@@ -53,8 +53,8 @@ struct PixelInterval {
 };
 
 /// How many pixels' truths lie within picture +- half width, by how high the truth is: most pixels are empty,
-/// so a share of all is a figure about emptiness. Passes are the unit, each counts the same: windows of one
-/// pass are not exchangeable (Dunn, Wasserman, Ramdas 2018).
+/// so a share of all is a figure about emptiness. In share() and found() passes are the unit, each counts the
+/// same: windows of one pass are not exchangeable (Dunn, Wasserman, Ramdas 2018). of_height() is over pixels.
 class IntervalCoverage {
  public:
   static constexpr double kCovered = 0.9;

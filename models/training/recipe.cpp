@@ -62,8 +62,9 @@ void Recipe::check() const {
   if (range) require(std::abs(range->span) > 1e-6, "range", "a span that is not 0", range->span);
   if (per_window && model.timesteps == 1)
     throw std::invalid_argument(
-        "recipe: single frames (--timesteps 1) say nothing of their own rest and gain; give --scaling fixed, "
-        "or --preset frame");
+        "recipe: single frames (timesteps 1) say nothing of their own rest and gain; give --scaling fixed, "
+        "or "
+        "--preset frame");
   if (!leave_out.empty() && split != SplitKind::texture && split != SplitKind::group)
     throw std::invalid_argument("--leave-out needs --split texture or group, found --split " +
                                 name_of(split));

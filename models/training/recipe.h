@@ -47,7 +47,8 @@ struct Recipe {
   std::optional<Scaling> range;    ///< rest and span; empty: SignalRange::fitted()
   bool per_window = true;          ///< whether a window is brought to its own rest and gain
   std::int64_t random_plates = 0;  ///< simulated passes besides, each over a plate of its own
-  /// Of the model's file; empty: of split group found on the tested groups, else the default ones.
+  /// What the model's file says of its intervals; empty: what split group finds on the tested groups, on
+  /// other splits the default.
   std::optional<PixelInterval> interval_factor;
 
   /// Throws std::invalid_argument naming the setting, its range and what was given.

@@ -83,10 +83,9 @@ constexpr std::size_t kTestedPerEpoch = 2000;
 constexpr std::int64_t kStepsPerLine = 50;
 
 // Scores an even sample of `windows`; those in contact count.
-Metrics scores_of(const Trainer& trainer, const std::vector<std::uint32_t>& windows,
-                  const std::function<bool()>& stop) {
+Metrics scores_of(const Trainer& trainer, const std::vector<std::uint32_t>& windows) {
   return score(Ensemble({CompiledModel(trainer.model())}), trainer.windows(),
-               evenly_spaced(windows, kTestedPerEpoch), stop)
+               evenly_spaced(windows, kTestedPerEpoch))
       .contact();
 }
 
@@ -169,8 +168,8 @@ TrainingTask window_task(const Recipe& given, const std::string& recordings, con
   return task;
 }
 
-void end_epoch(Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop) {
-  if (!task.held_out.empty()) trainer.epoch_scored(scores_of(trainer, task.held_out, stop).ssim);
+void end_epoch(Trainer& trainer, const TrainingTask& task) {
+  if (!task.held_out.empty()) trainer.epoch_scored(scores_of(trainer, task.held_out).ssim);
 }
 
 bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks) {
@@ -187,7 +186,7 @@ bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& 
     sums.gradient_norm += report.gradient_norm;
     ++steps;
     const bool epoch_ends = report.step % trainer.steps_per_epoch() == 0;
-    if (epoch_ends) end_epoch(trainer, task, callbacks.stop);
+    if (epoch_ends) end_epoch(trainer, task);
     if (callbacks.step) callbacks.step(report);
     if (callbacks.log && (epoch_ends || report.step % kStepsPerLine == 0)) {
       for (double* sum : sums.all()) *sum /= static_cast<double>(steps);
@@ -196,7 +195,7 @@ bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& 
                     std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       sums.step = report.step, sums.learning_rate = report.learning_rate;
       if (epoch_ends) {
-        const Metrics test = scores_of(trainer, task.split.test, callbacks.stop);
+        const Metrics test = scores_of(trainer, task.split.test);
         if (test.windows > 0) sums.test_ssim = test.ssim, sums.test_psnr_db = test.psnr_mean_db;
       }
       callbacks.log(std::exchange(sums, {}));

@@ -61,9 +61,9 @@ struct TrainingCallbacks {
   double seconds_before = 0;  ///< on the log's clock when this process began
 };
 
-/// Behind the last step of an epoch: scores the windows that are held out, where there are any, for
-/// Trainer::epoch_scored(). `stop` ends the scoring early.
-void end_epoch(Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop = {});
+/// Behind the last step of an epoch: scores 2,000 of the windows that are held out, where there are any, for
+/// Trainer::epoch_scored(). Nothing ends it early: a training that is resumed has the same best epoch.
+void end_epoch(Trainer& trainer, const TrainingTask& task);
 
 /// Trains until Trainer::done(), or to the end of the step in which `stop` returns true; returns whether all
 /// steps are done. Throws as Trainer::train_step and Trainer::save.

@@ -82,6 +82,8 @@ class Trainer {
   void use_best();
   /// Of the best epoch, in the order of the parameters; empty until one was scored.
   const std::vector<Tensor>& best() const { return best_; }
+  /// What a saved state says of it: "best_score", "best_epoch" and "epochs_since_best".
+  std::map<std::string, std::string> best_entries() const;
   std::int64_t best_epoch() const { return best_epoch_; }  ///< from 1; 0: none was scored
   double best_score() const { return best_score_; }
   const Recipe& recipe() const { return recipe_; }

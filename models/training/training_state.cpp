@@ -56,6 +56,13 @@ void Trainer::for_each_tensor(const std::function<void(const std::string&, const
   for (const Moments& m : moments()) visit(m.name, m.values);
 }
 
+std::map<std::string, std::string> Trainer::best_entries() const {
+  if (best_.empty()) return {};
+  return {{"best_score", format(best_score_)},
+          {"best_epoch", std::to_string(best_epoch_)},
+          {"epochs_since_best", std::to_string(epochs_since_best_)}};
+}
+
 void Trainer::save(const std::string& path, std::map<std::string, std::string> origin) const {
   check_same();
   if (!ranks_.first()) return;
@@ -65,11 +72,7 @@ void Trainer::save(const std::string& path, std::map<std::string, std::string> o
   for (const Moments& m : moments()) state.push_back(to_stored(m.parameter, m.values, m.name));
   for (std::size_t i = 0; i < best_.size(); ++i)
     state.push_back(to_stored(parameters[i], best_[i], "optimizer.best." + parameters[i].name));
-  if (!best_.empty()) {
-    metadata["best_score"] = format(best_score_);
-    metadata["best_epoch"] = std::to_string(best_epoch_);
-    metadata["epochs_since_best"] = std::to_string(epochs_since_best_);
-  }
+  metadata.merge(best_entries());
   metadata["step"] = std::to_string(step_);
   metadata["flat_steps"] = std::to_string(flat_steps_);
   write_checkpoint(path, parameters, std::move(metadata), state);

@@ -23,8 +23,8 @@ class WebView {
           Recorder& recorder, PressedOrder* order);
 
   /// Never waits: a state that comes while the server takes the one before is left out, and false returned.
-  /// `changed`: region of the map (null: there is none) since the last that was taken. A page that comes
-  /// makes all of it told anew.
+  /// `map`: null where there is none; `changed`: its region since the last that was taken. A page that comes
+  /// has all of it told anew.
   bool update(const LiveState& state, const SurfaceMap* map = nullptr, const MapRegion& changed = {});
   /// Whether somebody has wished to re-zero since the last call.
   bool take_rezero() { return rezero_.exchange(false); }

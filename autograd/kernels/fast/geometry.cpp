@@ -21,7 +21,7 @@ std::vector<TapPairs> pairs_of(const ConvSettings& s) {
   return pairs;
 }
 
-// Groups the outputs of a (width x height) map by y mod stride_y and x mod stride_x; within a group every
+// Groups the outputs of a (width x height) map by y mod stride_h and x mod stride_w; within a group every
 // output away from the border uses the same taps.
 std::vector<Phase> phases_of(const std::vector<TapPairs>& pairs, bool to_input, Dim height, Dim width,
                              Dim stride_h, Dim stride_w) {

@@ -4,10 +4,9 @@
 #include <regex>
 
 #include "data/recordings/recording.h"
-#include "io/files/safetensors.h"
 #include "io/numbers/random.h"
 #include "tests/apps/common/expect.h"
-#include "tests/support/test.h"
+#include "tests/support/tensor_file.h"
 
 namespace supertac::frames_test {
 
@@ -84,8 +83,15 @@ TEST_F(Frames, ATrainingThatKeepsItsBestEpochIsRepeated) {
       << kept;
   const std::string audit = "supertac-check training m.safetensors --data data --segments 1000";
   succeed(audit);
-  std::filesystem::copy(path("m.run/last.safetensors"), path("m.safetensors"),
-                        std::filesystem::copy_options::overwrite_existing);
+  const std::string other_end = path("m.run/last.safetensors"),
+                    kept_state = path("m.run/states/8.safetensors");
+  TensorFile state(SafetensorsFile::read(kept_state));
+  const auto honest = state;
+  state.metadata["best_score"] = "0.99";
+  state.write(kept_state);
+  EXPECT_TRUE(contains(run(audit).out, "the best epoch"));
+  honest.write(kept_state);
+  std::filesystem::copy(other_end, path("m.safetensors"), std::filesystem::copy_options::overwrite_existing);
   const ProcessResult other = run(audit);
   EXPECT_EQ(other.code, 1);
   EXPECT_TRUE(contains(other.out, "the model's file")) << other.out;
