@@ -23,9 +23,10 @@ std::size_t signal_feature_count(const TaxelArray& array, std::size_t frames);
 ///            share of the rows' swing sqrt(E_r E_r+1) + 0.003; k' is the taxel of row r + 1 behind k,
 ///            L = T / 8, E_r the mean square of a row: rows slide over the same plate one after the other,
 ///            and exchanged cables turn the order round
-/// Of longer windows 64 to 127 frames, evenly spread, are looked at. A single frame is its own features: how its taxels go
-/// together tells the skin, and rows that are exchanged do not go together. Throws std::invalid_argument
-/// unless the window holds whole frames, one or 16 at least, and `out` has signal_feature_count numbers.
+/// Of longer windows 64 to 127 frames, evenly spread, are looked at. A single frame is its own features: how
+/// its taxels go together tells the skin, and rows that are exchanged do not go together. Throws
+/// std::invalid_argument unless the window holds whole frames, one or 16 at least, and `out` has
+/// signal_feature_count numbers.
 void signal_features(std::span<const float> window, const TaxelArray& array, std::span<float> out);
 std::vector<float> signal_features(std::span<const float> window, const TaxelArray& array);
 
