@@ -187,11 +187,12 @@ Layout dated_layout_of(std::uint64_t seed) {
 
 TEST(ProbeBinary, ClocksOfRealSecondsAreFound) { EXPECT_GE(right_of(12, dated_layout_of), 10); }
 
-// A sum that no sensor's file can say is no signal: the layout is refused.
+// A sum that no sensor's file can say is no signal: the layout is refused. Of seeds from 13 on, two of which
+// had a counter before a checksum drafted as a clock.
 TEST(ProbeBinary, SumsAndCountersAreNoValues) {
   for (int kind = 0; kind < 4; ++kind) {
     const int right = right_of(static_cast<std::uint64_t>(mutations(4)),
-                               [=](std::uint64_t seed) { return odd_layout_of(seed, kind); });
+                               [=](std::uint64_t seed) { return odd_layout_of(12 + seed, kind); });
     EXPECT_TRUE(kind == 0 || right == 0) << kind;
   }
 }
