@@ -2,6 +2,7 @@
 // epoch.
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "io/numbers/numbers.h"
@@ -27,6 +28,7 @@ void expect_same(const SafetensorsFile& file, const std::map<std::string, std::s
 }  // namespace
 
 void Trainer::epoch_scored(double score) {
+  if (std::isnan(score)) return;  // nothing that was held out is in contact: no epoch is better than others
   ++epochs_since_best_;
   if (!best_.empty() && !(score > best_score_)) return;
   best_.clear();

@@ -85,8 +85,9 @@ class MicroBatchWatch : Trace, ReverseWatch {
  private:
   Json inputs_of(std::size_t index, const char* way) {
     const TracedOp& op = ops()[index];
-    const std::string name = prefix_ + std::string(index < 100 ? index < 10 ? 2 : 1 : 0, '0') +
-                             std::to_string(index) + "." + std::string(op.op) + way;
+    std::string number = std::to_string(index);
+    number.insert(0, 3 - std::min<std::size_t>(3, number.size()), '0');
+    const std::string name = prefix_ + number + "." + std::string(op.op) + way;
     Json inputs = Json::array();
     for (const Variable& x : op.inputs) inputs.push_back(opening_.note(name, x.value()));
     if (op.settings.constant.defined()) inputs.push_back(opening_.note(name, op.settings.constant));
